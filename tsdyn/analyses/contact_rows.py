@@ -426,23 +426,40 @@ def find_multipliers(context, t, levels, memory, redundant, out):
         write_multipliers(c, t[k], levels[k], redundant, out[k])
 
 
+@kernel
+def write_reactions(c, t, levels, redundant, out):
+    """As `write_multipliers`, with friction in proportion to reactions: whether there are any.
+
+    Newton's method goes on from those that it has found before.
+    """
+    r = c.tangent.friction
+    found = _evaluate(c, t, levels)
+    found = found and accelerate_with_friction(c.graph, c.system, c.work, c.tangent, t, LAST_PLACE)
+    for e in range(r.lam.size):
+        if c.graph.row[e] >= 0:
+            out[c.graph.row[e]] = r.lam[e] if found else math.nan
+    mark_redundant(c.graph, c.tangent, redundant, out)
+    return found
+
+
+@kernel
+def begin_reactions(c):
+    """Begin as in a run that goes on from a checkpoint."""
+    r = c.tangent.friction
+    for e in range(r.lam.size):
+        r.lam[e] = 0.0
+
+
 @entry("pvmvdmm")
 def find_reactions(context, t, levels, memory, redundant, out, loads):
-    """The same with friction in proportion to reactions, and its normal loads (k, frictions)."""
+    """out (k, m): the same at times t (k,) and levels (k, 3 n), and normal loads (k, frictions)."""
     c = load_parts(context)
     recall(c.system, memory)
-    r = c.tangent.friction
-    for e in range(r.lam.size):  # as in a run that goes on from a checkpoint
-        r.lam[e] = 0.0
+    begin_reactions(c)
     for k in range(t.size):
-        found = _evaluate(c, t[k], levels[k])
-        found = found and accelerate_with_friction(c.graph, c.system, c.work, c.tangent, t[k], LAST_PLACE)
-        for e in range(r.lam.size):
-            if c.graph.row[e] >= 0:
-                out[k, c.graph.row[e]] = r.lam[e] if found else math.nan
-        mark_redundant(c.graph, c.tangent, redundant, out[k])
+        found = write_reactions(c, t[k], levels[k], redundant, out[k])
         for i in range(loads.shape[1]):
-            loads[k, i] = r.load[7 * i] if found else math.nan
+            loads[k, i] = c.tangent.friction.load[7 * i] if found else math.nan
 
 
 KERNELS = (

@@ -9,7 +9,18 @@ from ..jit.kernels import Record, callback, caller, data_of, entry, kernel, load
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
 from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
-from .tolerances import FROM_REST, ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTLY, SHOWN_TURN
+from .tolerances import (
+    FAR,
+    FROM_REST,
+    ROOT,
+    ROOT_STEPS,
+    ROUGH_ROOT,
+    SAME_INSTANT,
+    SHORTLY,
+    SHOWN_TURN,
+    SMOOTH,
+    STEADY,
+)
 
 # Newton's method for the function of a survey that crosses zero first.
 
@@ -46,7 +57,8 @@ def move(values, marks, width, step):
     return _move(values, marks, width, step)
 
 
-# The search: samples at Chebyshev points, a survey of all functions, the first root by true values.
+# The search: samples at Chebyshev points, a survey of all functions, the first root by true values. Most steps are
+# clear of zeros by far, which polynomials through both ends show: no state of the step is read then.
 
 # Of kernels of functions: two contexts, t, the state (3, n), values to be written; where the step began: the time, the
 # state, and angles of joints, roughly
@@ -153,6 +165,37 @@ def _evaluate_within(s, step, t, whole, out):
 
 
 @kernel
+def _is_smooth(step):
+    """Whether polynomials of degree five through both ends follow the motion of a step.
+
+    By h qdd at both ends velocities change as the trapezoidal rule has it; of an oscillation, up to some 2.5 rad.
+    """
+    h = step.t1 - step.t0
+    fastest, first, last = 0.0, step.before, step.now
+    for j in range(first.shape[1]):
+        fastest = max(fastest, abs(first[1, j]), abs(last[1, j]))
+    for j in range(first.shape[1]):
+        off = last[1, j] - first[1, j] - 0.5 * h * (first[2, j] + last[2, j])
+        if not abs(off) <= SMOOTH * h * max(abs(first[2, j]), abs(last[2, j])) + STEADY * fastest:
+            return False
+    return True
+
+
+@kernel
+def _follow(step, t, out):
+    """out (3, n) = q and qd of these polynomials at t: off the manifold by as much as they are off the motion."""
+    h = step.t1 - step.t0
+    first, last, x = step.before, step.now, (t - step.t0) / h
+    for j in range(out.shape[1]):
+        v, a = h * first[1, j], h * h * first[2, j]
+        d = last[0, j] - first[0, j] - v - 0.5 * a
+        e, f = h * last[1, j] - v - a, h * h * last[2, j] - a
+        c3, c4, c5 = 10.0 * d - 4.0 * e + 0.5 * f, 7.0 * e - 15.0 * d - f, 6.0 * d - 3.0 * e + 0.5 * f
+        out[0, j] = first[0, j] + x * (v + x * (0.5 * a + x * (c3 + x * (c4 + x * c5))))
+        out[1, j] = (v + x * (a + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))) / h
+
+
+@kernel
 def _turn_rate(spins, qd):
     """The fastest turn of a body, rad/s."""
     fastest = 0.0
@@ -165,13 +208,13 @@ def _turn_rate(spins, qd):
 
 
 @kernel
-def _survey(s, step, t0, t1, turning):
+def _survey(s, step, t0, t1, turning, roughly):
     """The degree that resolves the functions on [t0, t1], with the samples of it, and marks; 0 if there is no state.
 
-    turning: of a body, rad/s.
+    turning: of a body, rad/s. roughly: by states of `_follow`, and no more than the lowest degree.
     """
     m, known, N = s.value.size, 0, LOWEST
-    while turning * (t1 - t0) > SHOWN_TURN * N and N < LARGEST:
+    while not roughly and turning * (t1 - t0) > SHOWN_TURN * N and N < LARGEST:
         N *= 2
     while True:
         table = kernel_table(s.tables, N)
@@ -187,13 +230,16 @@ def _survey(s, step, t0, t1, turning):
             t = t1 if i == N + 1 else t0 + 0.5 * (t1 - t0) * (table.points[i] + 1.0)
             if t == step.t1:
                 _evaluate(s, step.first, step.second, t, step.now, step.t0, step.before, samples[i])
+            elif roughly:
+                _follow(step, t, s.state)
+                _evaluate(s, step.first, step.second, t, s.state, step.t0, step.before, samples[i])
             elif not _evaluate_within(s, step, t, 0, samples[i]):
                 return 0
         copy(s.value, samples[0])
         size = table.fine.size
         fine = matrix(data_of(s.fine), 2, size)
         grid = table.values, table.errors, table.widened, table.fine
-        if look(*grid, samples, s.noise, t0, t1, fine, s.marks) != 0 or N == LARGEST:
+        if look(*grid, samples, s.noise, t0, t1, fine, s.marks) != 0 or N == LARGEST or roughly:
             return N
         N, known = 2 * N, N + 1
 
@@ -219,23 +265,34 @@ def _size(samples, j):
 
 @kernel
 def _mark(s, samples):
-    """Leave slopes to the functions that cross zero once, and no time to those clear of it; whether all are clear.
+    """Leave slopes to the functions that cross zero once, and no time to those clear of it: CLEAR if all are, or FOUND.
 
     Values of known rounding alone have no zero. UNSURE where a `Track` knows more of a function that isn't clear on the
     side that it falls from.
     """
-    clear = 1
+    clear = CLEAR
     for j in range(s.value.size):
         is_clear = s.left[j] == 0 or s.marks[j, 0] == math.inf or _size(samples, j) <= s.least[j]
         if s.odd[j] != 0 and not (is_clear and s.falls[j] * samples[samples.shape[0] - 1, j] < 0.0):
             return UNSURE
         if not is_clear:
-            clear = 0
+            clear = FOUND
         if is_clear or not (s.marks[j, 1] > s.marks[j, 0] and s.falls[j] * s.value[j] < 0.0):
             s.marks[j, 3] = math.nan
         if is_clear:
             s.marks[j, 0] = math.inf
     return clear
+
+
+@kernel
+def _are_far(s, samples):
+    """Whether all values are far from zero."""
+    for j in range(s.value.size):
+        least = FAR * _size(samples, j)
+        for i in range(samples.shape[0]):
+            if not abs(samples[i, j]) > least:
+                return False
+    return True
 
 
 @kernel
@@ -294,22 +351,25 @@ def find_first(search, context, run, first, second, arrays):
     s, a = load_search(search), load_arrays(arrays)
     t0, t1 = s.numbers.t0, s.numbers.t1
     step = SearchedStep(context, run, a.block, a.charts, a.points, first, second, t0, a.before, t1, a.now)
-    numbers, m, end, width = s.numbers, s.value.size, t1, t1 - t0
+    numbers, m, end, width, roughly = s.numbers, s.value.size, t1, t1 - t0, _is_smooth(step)
     turning = max(_turn_rate(s.spins, a.before[1]), _turn_rate(s.spins, a.now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
     numbers.place, numbers.found = OTHER_CHART, -1
     for j in range(m):
         s.left[j] = 1
     while True:
-        degree = _survey(s, step, t0, end, turning)
+        degree = _survey(s, step, t0, end, turning, roughly)
         samples = matrix(data_of(s.samples), degree + 2, m)
         if degree == 0 or (numbers.new != 0 and numbers.found < 0 and _may_have_fallen(s, samples)):
             return UNSURE
         clear = _mark(s, samples)
+        if clear == CLEAR and not (roughly and not _are_far(s, samples)):
+            break
+        if roughly:  # that is to be known better
+            roughly = False
+            continue
         if clear == UNSURE:
             return UNSURE
-        if clear == 1:
-            break
         width = end - t0
         if _first_root(s, step, scratch[0], width) != ARRIVED:
             return UNSURE

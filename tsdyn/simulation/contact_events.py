@@ -6,7 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analyses.contact_rows import load_rows, reaction_workspace, write_multipliers, write_rows
+from ..analyses.contact_rows import (
+    begin_reactions,
+    load_rows,
+    reaction_workspace,
+    write_multipliers,
+    write_reactions,
+    write_rows,
+)
 from ..jit.kernels import Record, callback, kernel, loader, matrix, resident, vector
 from ..maths.tolerances import TINY
 from ..model.equations import recall
@@ -15,7 +22,7 @@ from ..runs.group_search import VALUES, KernelFunctions
 from ..workspaces import load_parts
 from .grips import carried, gap_row, slip_columns
 from .phase_scenes import first_row_of
-from .tolerances import FASTER, SLOW, STRAIGHT, TURNED
+from .tolerances import BEGINS, FASTER, SLOW, TURNED
 
 # Reactions
 
@@ -48,17 +55,32 @@ load_reactions = loader(ReactionParts(ReactionNumbers(), _none, _whole, _none, _
 def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: VALUES
     """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique."""
     c, x = load_parts(parts), load_reactions(own)
-    closed, sticking, lam = x.normal.size, x.which.size, x.lam
-    values = vector(out, closed + sticking)
     recall(c.system, x.memory)
-    write_multipliers(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, lam)
-    for i in range(closed):
-        values[i] = x.slack[i] - x.sign[i] * lam[x.normal[i]]
-    for k in range(sticking):
-        i, j = x.slip[2 * k], x.slip[2 * k + 1]
-        T = math.hypot(lam[i], lam[j]) if i >= 0 and j >= 0 else math.nan
-        values[closed + k] = x.static[k] * values[x.which[k]] - T
+    write_multipliers(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, x.lam)
+    _compare(x, vector(out, x.normal.size + x.which.size))
     return 0
+
+
+@callback(VALUES)
+def find_reactions_beside_friction(parts, own, t, state, out, t0, before, near):  # eight: VALUES
+    """The same with friction in proportion to reactions."""
+    c, x = load_parts(parts), load_reactions(own)
+    recall(c.system, x.memory)
+    begin_reactions(c)
+    write_reactions(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, x.lam)
+    _compare(x, vector(out, x.normal.size + x.which.size))
+    return 0
+
+
+@kernel
+def _compare(x, out):
+    closed = x.normal.size
+    for i in range(closed):
+        out[i] = x.slack[i] - x.sign[i] * x.lam[x.normal[i]]
+    for k in range(x.which.size):
+        i, j = x.slip[2 * k], x.slip[2 * k + 1]
+        T = math.hypot(x.lam[i], x.lam[j]) if i >= 0 and j >= 0 else math.nan
+        out[closed + k] = x.static[k] * out[x.which[k]] - T
 
 
 class Reactions(KernelFunctions):
@@ -92,8 +114,8 @@ class Reactions(KernelFunctions):
 
     @cached_property
     def kernel(self):
-        """As of `GroupSearch`; None where Python evaluates them, since laws are called or loads depend on reactions."""
-        if self.workspace.count or calls_laws(self.packed):
+        """As of `GroupSearch`; None where Python evaluates them, since laws are called."""
+        if calls_laws(self.packed):
             return None
         memory, scratch = np.zeros(self.packed.system.memory.size), np.zeros(self.workspace.m)
         own, *self._keep = resident(
@@ -103,7 +125,8 @@ class Reactions(KernelFunctions):
             )
         )  # fmt: skip
         count = len(self.closed) + len(self.sticks)
-        return find_unit_reactions, self.workspace.address, own, count, memory
+        find = find_reactions_beside_friction if self.workspace.count else find_unit_reactions
+        return find, self.workspace.address, own, count, memory
 
     def over(self, states):
         """Values (k, closed and sticking) of `States`."""
@@ -156,18 +179,19 @@ load_slips = loader(
 
 
 @kernel
-def _slip(x, i, state, d):
-    """Component of slip i along a direction d, ground frame, of any length, and its size, by the rows in J."""
-    along, square = 0.0, 0.0
-    for r in range(2 * i, 2 * i + 2):
-        v, w = 0.0, 0.0
-        for j in range(x.numbers.n):
-            v += x.J[r, j] * state[1, j]
-        for j in range(3):
-            w += x.J[r, x.at[i] + j] * d[j]
-        along += v * w
-        square += v * v
-    return x.sign[i] * along, math.sqrt(square)
+def _slip(x, i, state):
+    """Components of slip i along its direction and across it, and its size, by the rows in J; what a slow one is."""
+    d, n = x.memory[x.ways[i] : x.ways[i] + 3], x.numbers.n
+    v0, v1, w0, w1 = 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        v0 += x.J[2 * i, j] * state[1, j]
+        v1 += x.J[2 * i + 1, j] * state[1, j]
+    for j in range(3):
+        w0 += x.J[2 * i, x.at[i] + j] * d[j]
+        w1 += x.J[2 * i + 1, x.at[i] + j] * d[j]
+    size = x.sign[i] * max(math.hypot(w0, w1), TINY)
+    along, across = (v0 * w0 + v1 * w1) / size, abs(v1 * w0 - v0 * w1) / abs(size)
+    return along, across, math.hypot(v0, v1), max(math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), TINY)
 
 
 @kernel
@@ -188,46 +212,35 @@ def find_unit_slips(contacts, own, t, state, out, t0, before, near):  # eight: V
     if slow:
         _find_rows(s, x, t0, first)
         for i in range(count):
-            d = x.memory[x.ways[i] : x.ways[i] + 3]
-            least = max(math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), TINY)
-            if x.since[i] == math.inf and _slip(x, i, first, d)[1] > FASTER * SLOW * least:
+            _, _, v, least = _slip(x, i, first)
+            if x.since[i] == math.inf and v > FASTER * SLOW * least:
                 x.since[i] = t0
     _find_rows(s, x, t, now)
     for i in range(count):
-        d = x.memory[x.ways[i] : x.ways[i] + 3]
-        least = max(math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), TINY)
-        along, v = _slip(x, i, now, d)
-        u, V = along / least, SLOW * least
-        turned, h = max((v - u) * (v + u) - STRAIGHT * v * v, 0.0), _BEGINS
-        bound = (TURNED * v) * (TURNED * v) + x.rounding[i] * x.rounding[i]
+        along, across, v, least = _slip(x, i, now)
+        V, h = SLOW * least, BEGINS
         if x.since[i] < math.inf:
-            h = turned / (turned + bound + TINY)
-        c = 0.5 + h * V / (v + V)
-        value = u - c * v
-        if u > 0.0 or (u < 0.0 and turned <= bound):
-            value *= 1.0 + c * v / u
+            turned = across * across
+            h = turned / (turned + (TURNED * v) * (TURNED * v) + x.rounding[i] * x.rounding[i] + TINY)
+        c = 0.5 + h * V / (v + V)  # from 1 on a slip has turned too far
+        value = along - c * across / math.sqrt(max(1.0 - c * c, TURNED * TURNED))
         begun, gain = x.begun[0, i], x.begun[1, i]
         if gain > 0.0:
-            value = value / (t - begun) if t > begun else _LEAST * gain
+            value = value / (t - begun) if t > begun else gain
         values[i] = value
     return 0
 
 
-_BEGINS = 0.49  # h of slips that begin
-_LEAST = 1.0 - (0.5 + _BEGINS) ** 2  # and the least value, over their size
-
-
 class Halting(KernelFunctions):
-    """Slips v of contacts, as event functions: u - c^2 v^2 / u, with u = d.v, zero where one ends or turns.
+    """Slips v of contacts, as event functions: u - z c / sqrt(1 - c^2), zero where one ends or d.v = c |v|.
 
-        c = 1/2 + w h,  w = V / (|v| + V),  h = z / (z + (TURNED v)^2 + noise^2),  z = v^2 - u^2
+        u = d.v,  z = |v - u d|,  c = 1/2 + w h,  w = V / (|v| + V),  h = z^2 / (z^2 + (TURNED |v|)^2 + noise^2)
 
-    Here d is of unit length, and V is SLOW times the slip below which friction has this direction. A slip turns by 60
-    degrees at v >> V; where it has turned at all when it is as slow as V, it takes its direction there, so that it ends
-    with its own. One that hasn't been FASTER V since its phase began, at the start of a step, has h = 0.49, and turns
-    by 8 degrees at v << V: it begins, or has its direction from there. Where it begins at rest, the value is divided by
-    the time since: the slip may turn at once. The value is 3/4 u where a slip ends straight, and smooth there; where
-    u < 0 otherwise, beyond the pole, it is u - c v.
+    Of a slip that ends without turning that is as smooth as v. Here d is of unit length, and V is SLOW times the slip
+    below which friction has this direction. A slip turns by 60 degrees at v >> V; where it has turned at all when it is
+    as slow as V, it takes its direction there, so that it ends with its own. One that hasn't been FASTER V at the start
+    of a step since its phase began has h = BEGINS, and turns by 8 degrees at v << V: it begins, or has its direction
+    from there. Where it begins at rest, the value is divided by the time since: the slip may turn at once.
 
     Parameters
     ----------
@@ -269,4 +282,4 @@ class Halting(KernelFunctions):
         return {i: t for i, t in zip(self.slides, self.since.tolist(), strict=True) if t < np.inf}
 
 
-KERNELS = find_unit_reactions, find_unit_slips
+KERNELS = find_unit_reactions, find_reactions_beside_friction, find_unit_slips

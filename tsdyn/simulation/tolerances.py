@@ -1,7 +1,5 @@
 """Limits of the preparation and assessment of runs; dimensionless unless a unit is named."""
 
-from ..maths.tolerances import EPS
-
 # --- choice of the method ---
 # Steps over which work is measured first; each measurement takes as many steps as there were before. Up to SETTLED
 # steps the implicit method may take (SETTLED / steps)^2 times the work of the explicit one: its steps are short until
@@ -86,8 +84,8 @@ SAME_WAY, SLOW = 1.0 - 1e-12, 100.0
 # rad: a slip that has turned by more takes its direction anew before it ends; reactions change by as much, of their
 # size. Velocity over V that tells it from one that begins.
 TURNED, FASTER = 1e-7, 4.0
-# Of the square of a slip: what rounding leaves across it where it goes straight on.
-STRAIGHT = 8.0 * EPS
+# By how much the cosine of the turn of a slip that begins is above 1/2 at least, at rest.
+BEGINS = 0.49
 
 # Load of a friction over that up to which it counts as none, from which on it counts.
 LOADED = 4.0

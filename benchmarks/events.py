@@ -2,7 +2,8 @@
 
 Balls bounce without loss, alone, as one of ten bodies, and ten at once; a stack of ten boxes with 40 contacts falls
 and comes to rest; pins of a chain stick and slide. Steps of ten boxes that slide on springs follow: without contacts,
-with 40 open ones, and with 30 closed ones, three points of each, in place of planar joints. Runs of a group are
+with 40 open ones, and on 30 points, three of each, in place of planar joints, bilateral ones and closed contacts.
+Last a block that slides and stops, by the exact law of friction and by the regularised one. Runs of a group are
 interleaved; least times of rounds.
 
 Run it: python -m benchmarks.events
@@ -16,7 +17,6 @@ from benchmarks.contender import timed
 
 G, ROUNDS = 9.81, 7
 BOX = np.array([0.5, 0.5, 0.25])  # m
-FLOOR = {"normal_b": (0, 0, 1), "unilateral": True}
 
 
 def balls(bodies, bouncing, falls=60.0):
@@ -39,11 +39,12 @@ def _boxes(scene, count, apart, height):
     ]
 
 
-def _corners(scene, box, other, top, corners=4, **law):
+def _corners(scene, box, other, top, corners=4, unilateral=True, **law):
     for k in range(corners):
         x, y = ((-1, -1), (1, -1), (-1, 1), (1, 1))[k] if corners == 4 else ((-1, -1), (1, -1), (0, 1))[k]
         corner = BOX * [x, y, -1]
-        scene.add(ts.constraints.PlaneContact(box, other, point_a=corner, point_b=(0, 0, top), **FLOOR, **law))
+        law |= {"normal_b": (0, 0, 1), "unilateral": unilateral}
+        scene.add(ts.constraints.PlaneContact(box, other, point_a=corner, point_b=(0, 0, top), **law))
 
 
 def stack(count=10):
@@ -61,18 +62,30 @@ def stack(count=10):
 
 
 def slide(kind):
-    """Ten boxes on a floor, each on a spring: on planar joints, with contacts far above or not, or on their corners."""
+    """Ten boxes on a floor, each on a spring: on planar joints, with contacts far above or not, or on three points."""
     scene = ts.Scene(gravity=(0, 0, -G))
     for i, box in enumerate(_boxes(scene, 10, (3.0, 0, 0), BOX[2])):
         anchor = {"point_b": (3.0 * i, 2.0, BOX[2])}
         scene.add(ts.forces.Spring(box, scene.ground, **anchor, stiffness=40.0 + i, free_length=1.5))
-        if kind == "closed":
-            _corners(scene, box, scene.ground, 0.0, 3)
+        if kind in ("bilateral", "closed"):
+            _corners(scene, box, scene.ground, 0.0, 3, kind == "closed")
         else:
             scene.add(ts.constraints.Planar.at(scene.ground, box, point=(3.0 * i, 0, 0), axis=(0, 0, 1)))
         if kind == "open":
             _corners(scene, box, scene.ground, -1.0)
     return scene, (0.0, 100.0)
+
+
+def block(exact):
+    """A block that slides on a floor from 2 m/s, stops after half of the span, and rests."""
+    scene, law = ts.Scene(gravity=(0, 0, -G)), {"kinetic": 0.2} if exact else {}
+    body = scene.add_body(1.0, (1, 1, 1), velocity=(2.0, 0, 0))
+    scene.add(ts.constraints.Parallel(body, scene.ground, axis_a=(0, 0, 1), axis_b=(0, 0, 1)))
+    floor = {"normal_b": (0, 0, 1), "unilateral": exact}
+    floor = scene.add(ts.constraints.PlaneContact(body, scene.ground, **floor, **law))
+    if not exact:
+        scene.add(ts.forces.ContactFriction(floor, kinetic=0.2, slip_velocity=1e-3))
+    return scene, (0.0, 2.0)
 
 
 def least(calls):
@@ -96,12 +109,19 @@ def main():
     for name, solution in found.items():
         events = len(solution.phases) - 1
         print(f"  {name:20} {seconds[name] / events * 1e6:8.1f} us, {events} events, {solution.stats.steps} steps")
-    scenes = {kind: slide(kind) for kind in ("none", "open", "closed")}
+    scenes = {kind: slide(kind) for kind in ("none", "open", "bilateral", "closed")}
     seconds, found = least({kind: lambda given=given: ts.simulate(*given) for kind, given in scenes.items()})
     print("a step of ten boxes that slide")
     for kind in found:
-        cost = {name: seconds[name] / found[name].stats.steps for name in (kind, "none")}
-        print(f"  {kind + ' contacts':20} {cost[kind] * 1e6:8.1f} us, x {cost[kind] / cost['none']:.2f}")
+        beside = "bilateral" if kind == "closed" else "none"
+        cost = {name: seconds[name] / found[name].stats.steps for name in (kind, beside)}
+        print(f"  {kind + ' contacts':20} {cost[kind] * 1e6:8.1f} us, x {cost[kind] / cost[beside]:.2f}")
+    scenes = {"exact": block(True), "regularised": block(False)}
+    seconds, found = least({law: lambda given=given: ts.simulate(*given) for law, given in scenes.items()})
+    print("a block that slides and stops")
+    for law in found:
+        steps = found[law].stats.steps
+        print(f"  {law:20} {seconds[law] * 1e3:8.2f} ms, {steps} steps, x {seconds[law] / seconds['regularised']:.2f}")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loa
 from ..errors import SingularConfiguration
 from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
 from ..formulations.tolerances import EXACT, REFINEMENTS
-from ..jit.kernels import ANY, Record, callback, caller, entry, kernel, loader, matrix, resident, vector
+from ..jit.kernels import ANY, Record, callback, caller, entry, kernel, loader, long_kernel, matrix, resident, vector
 from ..maths.complementarity import CONES
 from ..maths.dense_linalg import copy, largest
 from ..maths.root_isolation import SURVEYING
@@ -450,9 +450,19 @@ def begin_reactions(c):
         r.lam[e] = 0.0
 
 
+@long_kernel
+def write_lam(c, t, levels, redundant, out):
+    """The same from the start, where there is such friction, or not; False where friction has no reactions."""
+    if c.system.normals.size == 0:
+        write_multipliers(c, t, levels, redundant, out)
+        return True
+    begin_reactions(c)
+    return write_reactions(c, t, levels, redundant, out)
+
+
 @entry("pvmvdmm")
 def find_reactions(context, t, levels, memory, redundant, out, loads):
-    """out (k, m): the same at times t (k,) and levels (k, 3 n), and normal loads (k, frictions)."""
+    """out (k, m): as of `write_reactions` at times t (k,) and levels (k, 3 n), and normal loads (k, frictions)."""
     c = load_parts(context)
     recall(c.system, memory)
     begin_reactions(c)

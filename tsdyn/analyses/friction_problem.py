@@ -178,14 +178,6 @@ class Frictions:
         passing = np.append(np.linalg.norm(qd[r], axis=1), 0.0)[self.ends].sum(axis=1)
         return sizes + np.where(self.turns, passing, 0.0) / (self.packed.size or np.inf)
 
-    def speeds(self, q, qd, memory):
-        """Of those that slide (k, units): velocities along their directions, in a plane as of `within`."""
-        v, _, axes = self.motions(q, qd)
-        sizes = np.linalg.norm(memory[self.ways], axis=1)
-        lengths = np.where(self.signed | (sizes == 0.0), 1.0, sizes)
-        ways = memory[self.ways] / lengths[:, None] * np.where(self.signed[:, None], axes, 1.0)
-        return within(v, ways, self.signed)
-
     def turn(self, t, levels, memory):
         """Write the directions of slip into memory (k, slots), zero where a slip rate is zero to rounding.
 

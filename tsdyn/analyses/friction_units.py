@@ -46,47 +46,52 @@ def _turned(at, size, q, s, out):
             out[i] = s[i]
 
 
-@entry("mmwvvmmm")
-def slip_velocities(q, qd, table, points, axes, v, sizes, n):
-    """Slip velocities or rates v, axes n (k, 3 units), ground frame, and sizes of the terms of v (k, units).
+@kernel
+def slip_velocity(q, qd, one, point, axis, v, n):
+    """Slip velocity or rate v, axis n (3,), ground frame, of a unit of the table; the size of the terms of v.
 
-    v = v_a + w_a x s - v_b - w_b x (x_a - r_b), or w_a - w_b, at q, qd (k, n); points s and axes: (3 units,).
+    v = v_a + w_a x s - v_b - w_b x (x_a - r_b), or w_a - w_b, at q, qd (n,); point s and axis: (3,).
     """
     ra, va, wa, rb, vb, wb = stack(3), stack(3), stack(3), stack(3), stack(3), stack(3)
-    s, d = stack(3), stack(3)
+    s, d, size = stack(3), stack(3), 0.0
+    _moved(one[AT_A], one[SIZE_A], q, qd, ra, va, wa)
+    _moved(one[AT_B], one[SIZE_B], q, qd, rb, vb, wb)
+    # v = w_a - w_b, or v_a + w_a x s - v_b - w_b x d with d = r_a + s - r_b
+    if one[TURNS]:
+        for i in range(3):
+            v[i] = wa[i] - wb[i]
+            size += abs(wa[i]) + abs(wb[i])
+    else:
+        _turned(one[AT_A], one[SIZE_A], q, point, s)
+        for i in range(3):
+            d[i] = ra[i] + s[i] - rb[i]
+        for i in range(3):
+            j, m = (i + 1) % 3, (i + 2) % 3
+            va[i] += wa[j] * s[m] - wa[m] * s[j]
+            vb[i] += wb[j] * d[m] - wb[m] * d[j]
+            size += abs(va[i]) + abs(vb[i]) + abs(wa[j] * s[m]) + abs(wb[j] * d[m])
+        for i in range(3):
+            v[i] = va[i] - vb[i]
+    # Its part along the axis n of a, (v.n) n, or across the normal n of b, v - (v.n) n
+    if one[PART] == WHOLE:
+        return size
+    if one[PART] == ALONG:
+        _turned(one[AT_A], one[SIZE_A], q, axis, n)
+    else:
+        _turned(one[AT_B], one[SIZE_B], q, axis, n)
+    along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+    for i in range(3):
+        v[i] = along * n[i] if one[PART] == ALONG else v[i] - along * n[i]
+    return size
+
+
+@entry("mmwvvmmm")
+def slip_velocities(q, qd, table, points, axes, v, sizes, n):
+    """The same v, n (k, 3 units) and sizes (k, units) of all units at q, qd (k, n)."""
     for k in range(q.shape[0]):
         for u in range(sizes.shape[1]):
-            one, o, size = table[INTS * u : INTS * (u + 1)], 3 * u, 0.0
-            _moved(one[AT_A], one[SIZE_A], q[k], qd[k], ra, va, wa)
-            _moved(one[AT_B], one[SIZE_B], q[k], qd[k], rb, vb, wb)
-            # v = w_a - w_b, or v_a + w_a x s - v_b - w_b x d with d = r_a + s - r_b
-            if one[TURNS]:
-                for i in range(3):
-                    v[k, o + i] = wa[i] - wb[i]
-                    size += abs(wa[i]) + abs(wb[i])
-            else:
-                _turned(one[AT_A], one[SIZE_A], q[k], points[o : o + 3], s)
-                for i in range(3):
-                    d[i] = ra[i] + s[i] - rb[i]
-                for i in range(3):
-                    j, m = (i + 1) % 3, (i + 2) % 3
-                    va[i] += wa[j] * s[m] - wa[m] * s[j]
-                    vb[i] += wb[j] * d[m] - wb[m] * d[j]
-                    size += abs(va[i]) + abs(vb[i]) + abs(wa[j] * s[m]) + abs(wb[j] * d[m])
-                for i in range(3):
-                    v[k, o + i] = va[i] - vb[i]
-            # Its part along the axis n of a, (v.n) n, or across the normal n of b, v - (v.n) n
-            sizes[k, u] = size
-            if one[PART] == WHOLE:
-                continue
-            if one[PART] == ALONG:
-                _turned(one[AT_A], one[SIZE_A], q[k], axes[o : o + 3], d)
-            else:
-                _turned(one[AT_B], one[SIZE_B], q[k], axes[o : o + 3], d)
-            along = v[k, o] * d[0] + v[k, o + 1] * d[1] + v[k, o + 2] * d[2]
-            for i in range(3):
-                n[k, o + i] = d[i]
-                v[k, o + i] = along * d[i] if one[PART] == ALONG else v[k, o + i] - along * d[i]
+            one, o = table[INTS * u : INTS * (u + 1)], slice(3 * u, 3 * u + 3)
+            sizes[k, u] = slip_velocity(q[k], qd[k], one, points[o], axes[o], v[k, o], n[k, o])
 
 
 @entry("pdvvvm")

@@ -8,6 +8,7 @@ import numpy as np
 from ..jit.kernels import Record, callback, caller, data_of, entry, kernel, loader, matrix, resident, seen
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
+from ..model.laws import interrupts_answered
 from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
 from .tolerances import (
     FAR,
@@ -437,16 +438,19 @@ class KernelFunctions:
 
     Attributes
     ----------
-    kernel : tuple
+    functions : tuple
         As of `GroupSearch`.
+    kernel : tuple
+        The same, where steps are searched by kernels; None where the functions are evaluated in Python alone.
     """
 
     def over(self, states):
         """Values (k, count) of `States`."""
-        called, *contexts, count, memory = self.kernel
+        called, *contexts, count, memory = self.functions
         memory[:] = states.memory[: memory.size]
         levels, out = states.levels.reshape(states.t.size, 3 * states.n), np.empty((states.t.size, count))
-        evaluate_over(called.address, *contexts, states.t, levels, *states.beside, out)
+        evaluate = interrupts_answered()(evaluate_over) if self.kernel is None else evaluate_over
+        evaluate(called.address, *contexts, states.t, levels, *states.beside, out)
         return out
 
 

@@ -6,14 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analyses.contact_rows import (
-    begin_reactions,
-    load_rows,
-    reaction_workspace,
-    write_multipliers,
-    write_reactions,
-    write_rows,
-)
+from ..analyses.contact_rows import load_rows, reaction_workspace, write_lam, write_rows
 from ..jit.kernels import Record, callback, kernel, loader, matrix, resident, vector
 from ..maths.tolerances import TINY
 from ..model.equations import recall
@@ -55,32 +48,17 @@ load_reactions = loader(ReactionParts(ReactionNumbers(), _none, _whole, _none, _
 def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: VALUES
     """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique."""
     c, x = load_parts(parts), load_reactions(own)
+    closed, lam = x.normal.size, x.lam
+    values = vector(out, closed + x.which.size)
     recall(c.system, x.memory)
-    write_multipliers(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, x.lam)
-    _compare(x, vector(out, x.normal.size + x.which.size))
-    return 0
-
-
-@callback(VALUES)
-def find_reactions_beside_friction(parts, own, t, state, out, t0, before, near):  # eight: VALUES
-    """The same with friction in proportion to reactions."""
-    c, x = load_parts(parts), load_reactions(own)
-    recall(c.system, x.memory)
-    begin_reactions(c)
-    write_reactions(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, x.lam)
-    _compare(x, vector(out, x.normal.size + x.which.size))
-    return 0
-
-
-@kernel
-def _compare(x, out):
-    closed = x.normal.size
+    write_lam(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, lam)
     for i in range(closed):
-        out[i] = x.slack[i] - x.sign[i] * x.lam[x.normal[i]]
+        values[i] = x.slack[i] - x.sign[i] * lam[x.normal[i]]
     for k in range(x.which.size):
         i, j = x.slip[2 * k], x.slip[2 * k + 1]
-        T = math.hypot(x.lam[i], x.lam[j]) if i >= 0 and j >= 0 else math.nan
-        out[closed + k] = x.static[k] * out[x.which[k]] - T
+        T = math.hypot(lam[i], lam[j]) if i >= 0 and j >= 0 else math.nan
+        values[closed + k] = x.static[k] * values[x.which[k]] - T
+    return 0
 
 
 class Reactions(KernelFunctions):
@@ -113,10 +91,8 @@ class Reactions(KernelFunctions):
         return reaction_workspace(self.packed, self.redundant)
 
     @cached_property
-    def kernel(self):
-        """As of `GroupSearch`; None where Python evaluates them, since laws are called."""
-        if calls_laws(self.packed):
-            return None
+    def functions(self):
+        """As of `KernelFunctions`."""
         memory, scratch = np.zeros(self.packed.system.memory.size), np.zeros(self.workspace.m)
         own, *self._keep = resident(
             ReactionParts(
@@ -125,15 +101,18 @@ class Reactions(KernelFunctions):
             )
         )  # fmt: skip
         count = len(self.closed) + len(self.sticks)
-        find = find_reactions_beside_friction if self.workspace.count else find_unit_reactions
-        return find, self.workspace.address, own, count, memory
+        return find_unit_reactions, self.workspace.address, own, count, memory
+
+    @property
+    def kernel(self):
+        """As of `GroupSearch`; none where laws are called."""
+        return None if calls_laws(self.packed) else self.functions
 
     def over(self, states):
         """Values (k, closed and sticking) of `States`."""
-        if self.kernel is not None:
-            values = super().over(states)
-            if not np.isnan(values).any():
-                return values
+        values = super().over(states)
+        if not np.isnan(values).any():
+            return values
         lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
         N = -self.gaps.sign[self.closed] * lam[:, self.normal]
         held = N[:, self.which]
@@ -274,7 +253,7 @@ class Halting(KernelFunctions):
                 np.ascontiguousarray(starts),
             )
         )  # fmt: skip
-        self.kernel = find_unit_slips, workspace.rows_address, own, len(slides), memory
+        self.functions = self.kernel = find_unit_slips, workspace.rows_address, own, len(slides), memory
 
     @property
     def fast(self):
@@ -282,4 +261,4 @@ class Halting(KernelFunctions):
         return {i: t for i, t in zip(self.slides, self.since.tolist(), strict=True) if t < np.inf}
 
 
-KERNELS = find_unit_reactions, find_reactions_beside_friction, find_unit_slips
+KERNELS = find_unit_reactions, find_unit_slips

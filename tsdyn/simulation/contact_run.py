@@ -39,7 +39,7 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
 from ..runs.tolerances import START_ZERO
 from ..validation import counted, listed
-from . import contact_events, flights, hybrid
+from . import contact_events, flights, hybrid, unit_events
 from .checkpoints import Checkpoints
 from .contact_events import Halting, Reactions
 from .grips import items_of
@@ -90,7 +90,12 @@ FAILURES = {
 def _compile_once(slides):
     """Have compiled what events need; slides: whether there is exact friction of joints."""
     compile_ahead(
-        (*contact_rows.KERNELS, *contact_events.KERNELS, *flights.KERNELS, *(friction_units.KERNELS if slides else ()))
+        (
+            *contact_rows.KERNELS,
+            *contact_events.KERNELS,
+            *flights.KERNELS,
+            *((*friction_units.KERNELS, *unit_events.KERNELS) if slides else ()),
+        )
     )
 
 
@@ -259,10 +264,11 @@ class _ContactRun(Transitions, Checkpoints):
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), resume=None if other else self, archive=self.archive,
+                max_steps=self._steps_left(), resume=self, archive=self.archive,
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
+            self.is_sure = other is None  # whether no other method can take the phase over, from its start
             self.kind = None  # of the phase, as `Phases` has it
             if self.archive is not None:
                 self.archive.resting = still, resting[still]
@@ -352,6 +358,8 @@ class _ContactRun(Transitions, Checkpoints):
 
         It does where the same gaps are closed as before.
         """
+        if not self.is_sure:
+            return False
         self._end_phase(t)
         before = self.modes
         self.t, (self.q, self.qd, self.qdd), self.remembered = t, run.now.copy(), run.remembered.copy()
@@ -371,7 +379,8 @@ class _ContactRun(Transitions, Checkpoints):
         if not flights.Flights.serve(memory, groups):
             return None
         bounce = self.gaps.restitution[self.able].any() and not self.gaps.rough[self.able].all()
-        plain = bounce and not self.frictions.count and self.modes.same(UnitModes()) and memory.begins_again
+        plain = bounce and not self.frictions.count and self.modes.same(UnitModes())
+        plain = plain and self.is_sure and memory.begins_again
         return flights.Flights(self, groups, memory, reader, plain)
 
     def land(self, flown):

@@ -1,13 +1,20 @@
 """What ends a phase of a run, as event functions: gaps of contacts, holds and slips of frictions."""
 
+import math
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from ..analyses.contact_rows import GapCounts, OpenGaps, find_open_gaps, measure_opened, reaction_workspace
+from ..analyses.contact_rows import GapCounts, OpenGaps, find_open_gaps, measure_opened, reaction_workspace, write_lam
+from ..analyses.friction_units import INTS, slip_velocity
 from ..analyses.tolerances import LEVEL
-from ..jit.kernels import resident
+from ..jit.kernels import callback, loader, matrix, resident, stack, vector
 from ..maths.tolerances import TINY
+from ..model.equations import recall
+from ..model.laws import calls_laws
+from ..runs.group_search import VALUES, KernelFunctions
+from ..workspaces import load_parts
 from .tolerances import LOADED, REACTION_NOISE
 
 
@@ -59,7 +66,49 @@ class Closing:
         return values
 
 
-class Breaking:
+# Reactions that hold frictions
+
+
+class BreakingParts(NamedTuple):
+    """Frictions that stick, and after them those without a load."""
+
+    memory: np.ndarray  # what forces remember
+    first: np.ndarray  # int64 (sticking + 1,)  where the rows of each begin
+    held: np.ndarray  # int64  these rows
+    normal: np.ndarray  # int64 (sticking and light,)  the number of its normal load, -1 for none
+    share: np.ndarray  # (sticking,)  the bound for a normal load of one,
+    bound: np.ndarray  # (sticking,)  and by itself
+    limits: np.ndarray  # (sticking and light,)  loads that count as none
+    lam: np.ndarray  # (m,)  scratch
+
+
+_none, _whole = np.zeros(0), np.zeros(0, int)
+load_breaking = loader(BreakingParts(_none, *np.zeros((3, 0), int), *np.zeros((4, 0))))
+
+
+@callback(VALUES)
+def find_breaking(parts, own, t, state, out, t0, before, near):  # eight: VALUES
+    """out (sticking and light,): as of `Breaking`."""
+    c, x = load_parts(parts), load_breaking(own)
+    sticking, count, lam, load = x.share.size, x.normal.size, x.lam, c.tangent.friction.load
+    values = vector(out, count)
+    recall(c.system, x.memory)
+    regular = write_lam(c, t, vector(state, 3 * c.work.q.size), 0.0, lam)
+    for i in range(count):
+        N = load[7 * x.normal[i]] if x.normal[i] >= 0 else 0.0
+        if not regular:
+            values[i] = math.nan
+        elif i >= sticking:
+            values[i] = LOADED * x.limits[i] - N
+        else:
+            b, square = x.bound[i] + x.share[i] * N, 0.0
+            for j in range(x.first[i], x.first[i + 1]):
+                square += lam[x.held[j]] * lam[x.held[j]]
+            values[i] = (b * b - square) / (b + x.share[i] * x.limits[i] + TINY)
+    return 0
+
+
+class Breaking(KernelFunctions):
     """What reactions lack of their limits, as event functions.
 
     Of frictions that stick: (b^2 - lam^2) / (b + c), with bound b, multipliers lam and the bound c at the limit; it is
@@ -81,28 +130,79 @@ class Breaking:
     """
 
     def __init__(self, packed, sticking, light, limits):
-        self.packed, self.sticking, self.normals = packed, sticking, [unit.load.normal for unit in light]
-        self.least = limits[: len(sticking)]
-        self.limits = LOADED * limits[len(sticking) :]
+        self.packed, self.sticking, self.light, self.limits = packed, sticking, light, limits
         self.noise = REACTION_NOISE * limits * ([unit.bound[0] for unit in sticking] + [1.0] * len(light))
 
     @cached_property
-    def workspace(self):
-        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
-        return reaction_workspace(self.packed)
+    def functions(self):
+        """As of `KernelFunctions`; made late: the start of the phase may show that rows are redundant."""
+        workspace, rows = reaction_workspace(self.packed), self.packed.derived.holds
+        held = [rows[unit.slot] for unit in self.sticking]
+        first = np.cumsum([0, *map(len, held)])
+        bounds = np.array([unit.bound for unit in self.sticking], float).reshape(-1, 2)
+        loads = [*(unit.load.normal if unit.bound[0] else -1 for unit in self.sticking)]
+        normal = np.array([*loads, *(unit.load.normal for unit in self.light)], int)
+        memory = np.zeros(self.packed.system.memory.size)
+        own, *self._keep = resident(
+            BreakingParts(
+                memory, first, np.concatenate([_whole, *held]), normal, *bounds.T.copy(), self.limits,
+                np.zeros(workspace.m),
+            )
+        )  # fmt: skip
+        return find_breaking, workspace.address, own, normal.size, memory
 
-    def over(self, states):
-        """Values (k, sticking and light units) of states at k times."""
-        lam, loads = self.workspace.multipliers(states.t, states.levels, states.memory)
-        values = np.zeros((states.t.size, len(self.sticking)))
-        for unit, value, limit in zip(self.sticking, values.T, self.least, strict=True):
-            (share, bound), held = unit.bound, lam[:, self.packed.derived.holds[unit.slot]]
-            bound = bound + share * loads[:, unit.load.normal] if share else bound
-            value += (bound * bound - (held * held).sum(axis=1)) / (bound + share * limit + TINY)
-        return np.hstack((values, self.limits - loads[:, self.normals])) if self.normals else values
+    @property
+    def kernel(self):
+        """As of `GroupSearch`; none where laws are called."""
+        return None if calls_laws(self.packed) else self.functions
 
 
-class Slowing:
+# Slides of frictions
+
+
+class SlowingParts(NamedTuple):
+    """Frictions that slide or stick."""
+
+    memory: np.ndarray  # what forces remember
+    table: np.ndarray  # int64, as of `slip_velocities`
+    points: np.ndarray
+    axes: np.ndarray
+    ways: np.ndarray  # int64 (3 units,)  where the memory has directions
+    signed: np.ndarray  # int64 (units,)  1 of those along an axis, whose direction is a sign
+    begun: np.ndarray  # (2, units)  time and acceleration of those that have just begun to slide
+    sizes: np.ndarray  # (2,)  numbers of coordinates and units
+
+
+load_slowing = loader(SlowingParts(_none, _whole, _none, _none, _whole, _whole, np.zeros((2, 0)), _whole))
+
+
+@callback(VALUES)
+def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
+    """out (units,): as of `Slowing`."""
+    x = load_slowing(own)
+    n, count = x.sizes[0], x.sizes[1]
+    now, values, v, axis = matrix(state, 3, n), vector(out, count), stack(3), stack(3)
+    for u in range(count):
+        o, one = 3 * u, x.table[INTS * u : INTS * (u + 1)]
+        slip_velocity(now[0], now[1], one, x.points[o : o + 3], x.axes[o : o + 3], v, axis)
+        d0, d1, d2 = x.memory[x.ways[o]], x.memory[x.ways[o + 1]], x.memory[x.ways[o + 2]]
+        if x.signed[u] != 0:
+            values[u] = d0 * (v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2])
+        else:
+            size = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+            size = size if size > 0.0 else 1.0
+            along, square = (v[0] * d0 + v[1] * d1 + v[2] * d2) / size, 0.0
+            for i in range(3):
+                across = v[i] - along * x.memory[x.ways[o + i]] / size
+                square += across * across
+            values[u] = along - math.sqrt(square / 3.0)
+        begun, first = x.begun[0, u], x.begun[1, u]
+        if begun < math.inf:
+            values[u] = values[u] / (t - begun) if t > begun else first
+    return 0
+
+
+class Slowing(KernelFunctions):
     """The velocities of frictions, along the directions in which they slide, as event functions.
 
     In a plane a new direction is taken where it has turned by 60 degrees: `friction_problem.within`. The velocity of
@@ -123,14 +223,17 @@ class Slowing:
     """
 
     def __init__(self, frictions, begun, rates):
-        self.frictions, self.begun, self.noise = frictions, begun, np.zeros(frictions.count)
-        for i, (_, first) in begun.items():
+        count, packed = frictions.count, frictions.packed
+        self.noise, starts = np.zeros(count), np.tile([[np.inf], [0.0]], count)
+        for i, (t, first) in begun.items():
             self.noise[i] = LEVEL * rates[i] if first < LEVEL / REACTION_NOISE * rates[i] else 0.0
+            starts[:, i] = t, first
+        memory, sizes = np.zeros(packed.system.memory.size), np.array([packed.system.bodies[:, 1].sum(), count], int)
+        ways, signed = np.ascontiguousarray(frictions.ways).ravel(), frictions.signed.astype(int)
+        own, *self._keep = resident(
+            SlowingParts(memory, frictions.table, frictions.points, frictions.axes, ways, signed, starts, sizes)
+        )
+        self.functions = self.kernel = find_slowing, own, own, count, memory
 
-    def over(self, states):
-        """Values (k, frictions) of states at k times."""
-        values = self.frictions.speeds(states.q, states.qd, states.memory)
-        for i, (begun, first) in self.begun.items():
-            later = states.t > begun
-            values[:, i] = np.where(later, values[:, i] / np.where(later, states.t - begun, 1.0), first)
-        return values
+
+KERNELS = find_breaking, find_slowing

@@ -82,6 +82,7 @@ class Reactions(KernelFunctions):
         self.slip = np.array([slip_columns(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
         self.which = np.array([self.closed.index(i) for i in self.sticks], int)
         self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
+        self.shares = False  # whether dependent rows share friction, which the kernel doesn't know of
         # Rows of gaps that are redundant have no reaction; where there is friction they have an unknown one
         self.redundant = np.nan if rough else 0.0
 
@@ -110,9 +111,11 @@ class Reactions(KernelFunctions):
 
     def over(self, states):
         """Values (k, closed and sticking) of `States`."""
-        values = super().over(states)
-        if not np.isnan(values).any():
-            return values
+        if not self.shares:
+            values = super().over(states)
+            if not np.isnan(values).any():
+                return values
+            self.shares = True
         lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
         N = -self.gaps.sign[self.closed] * lam[:, self.normal]
         held = N[:, self.which]

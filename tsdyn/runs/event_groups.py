@@ -43,6 +43,12 @@ class GroupMember:
     def __init__(self, over, which):
         self.over, self.which = over, which
 
+    def __call__(self, t, instant):
+        """The value at one state, an `EventInstant`: where the scene has an origin of its own."""
+        levels, counted = np.array([[instant.q, instant.qd, instant.qdd]]), lambda: instant.angles[None]
+        states = States(np.array([t]), levels, instant.memory, counted, instant._beside)
+        return float(self.over(states)[0, self.which])
+
 
 class Group:
     """Events whose functions are evaluated by one function.

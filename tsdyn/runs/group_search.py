@@ -11,7 +11,7 @@ from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, k
 from ..model.laws import interrupts_answered
 from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
 from .tolerances import (
-    FAR,
+    DISTANT,
     FROM_REST,
     ROOT,
     ROOT_STEPS,
@@ -289,7 +289,7 @@ def _mark(s, samples):
 def _are_far(s, samples):
     """Whether all values are far from zero."""
     for j in range(s.value.size):
-        least = FAR * _size(samples, j)
+        least = DISTANT * _size(samples, j)
         for i in range(samples.shape[0]):
             if not abs(samples[i, j]) > least:
                 return False

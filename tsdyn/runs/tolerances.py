@@ -121,7 +121,7 @@ FROM_REST, FALLEN = 1e-11, 1e-6
 # Of h qdd: by how much the trapezoidal rule may miss the change of a velocity in a step that polynomials of degree five
 # follow: (w h)^2 / 12 of an oscillation. Of the fastest coordinate: velocities that are rounding. Of the largest value
 # of a function: values far from zero, where those polynomials are off by some hundredths of a motion at most.
-SMOOTH, STEADY, FAR = 0.5, 1e-9, 0.05
+SMOOTH, STEADY, DISTANT = 0.5, 1e-9, 0.05
 # Steps of Newton's method from the root of an interpolant; share of the step up to which a move that doesn't get
 # shorter is rounding.
 ROOT_STEPS, ROUGH_ROOT = 6, 1e-8

@@ -244,6 +244,7 @@ class Halting(KernelFunctions):
 
     def __init__(self, gaps, slides, rounding, begun, fast):
         workspace, (rows, at, sign) = gaps.workspace, gaps.slips(slides)
+        self._workspace = workspace  # kept as long as addresses of it are in use
         self.slides, self.since = slides, np.array([fast.get(i, np.inf) for i in slides], float)
         self.noise = np.where([i in begun for i in slides], 0.0, rounding)
         place, memory = np.full(workspace.m, -1), np.zeros(gaps.packed.system.memory.size)

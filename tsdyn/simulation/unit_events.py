@@ -136,7 +136,8 @@ class Breaking(KernelFunctions):
     @cached_property
     def functions(self):
         """As of `KernelFunctions`; made late: the start of the phase may show that rows are redundant."""
-        workspace, rows = reaction_workspace(self.packed), self.packed.derived.holds
+        workspace = self._workspace = reaction_workspace(self.packed)  # kept as long as its address is in use
+        rows = self.packed.derived.holds
         held = [rows[unit.slot] for unit in self.sticking]
         first = np.cumsum([0, *map(len, held)])
         bounds = np.array([unit.bound for unit in self.sticking], float).reshape(-1, 2)

@@ -13,9 +13,9 @@ from benchmarks.by_hand import contenders as by_hand
 from benchmarks.contender import Contender, Outcome, rotation
 from benchmarks.measure import Measured, Row, measure
 from benchmarks.scenes import SCENES
+from examples import top
 from tests.helpers.scenes import constraints
 from tests.helpers.tolerances import EXACT, FINE, HELD, LOOSE, ROUNDING, TIGHT
-from tsdyn.testing.integrator_scenes import sliding_top
 
 PEERS = peers.contenders()
 SMALL = ("sliding top", "two-body pendulum", "two-body pendulum in space", "chain of 4", "tree of 7", "loop of 4")
@@ -236,7 +236,7 @@ def test_one_command():
 
 def test_rotation_matrices_are_those_of_the_solver():
     p = np.array([[0.5, -0.1, 0.7, 0.4]])
-    scene = sliding_top()
+    scene = top.build()
     body = scene.bodies[0]
     solution = ts.simulate(scene, (0.0, 0.01), integrator="rk45")
     np.testing.assert_allclose(rotation(solution.orientation(body)), solution.rotation(body), atol=EXACT)

@@ -192,7 +192,7 @@ def test_a_spring_has_no_direction_at_rest_at_its_anchor(free_length):
     mass = scene.add_point_mass(1.0, (1, 0, 0))
     scene.add(F.Spring(scene.ground, mass, stiffness=9.0, free_length=free_length, name="strut"))
     mass.position = (0, 0, 0)
-    with pytest.raises(ts.InconsistentState, match="finite.*strut"):
+    with pytest.raises(ts.InconsistentState, match=r"finite.*strut"):
         ts.simulate(scene, (0, 1))
 
 

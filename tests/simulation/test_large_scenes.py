@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from benchmarks import mechanisms
 from tests.helpers import driven
 from tests.helpers.constraint_levels import check
 from tests.helpers.scenes import random_body, random_primitive
@@ -19,6 +18,7 @@ from tsdyn.observables.diagnostics import constraint_rows
 from tsdyn.observables.evaluate import constraint_arrays
 from tsdyn.rows import constraint_graph as hubs
 from tsdyn.simulation.scene_cache import prepared
+from tsdyn.stress import rods as mechanisms
 from tsdyn.taylor import layout as expansion_pack
 
 C = ts.constraints

@@ -77,6 +77,18 @@ def test_a_block_that_slides_up_stops_or_comes_back(static):
     assert solution.sticking("floor")[-1] == (static is not None)
 
 
+@pytest.mark.parametrize("angle", [0.2, 0.4])
+@pytest.mark.parametrize("speed", [0.0, -1.0])
+def test_a_contact_that_slides_without_friction_sticks_up_to_its_static_bound(angle, speed):
+    """tan(0.2) = 0.203 is below it, tan(0.4) = 0.423 above."""
+    solution = ts.simulate(slope(0.0, angle, (speed, 0, 0), static=0.3), (0, 1))
+    a, holds = G * np.sin(angle), angle < 0.3
+    place = -(speed**2) / (2 * a) if holds else speed + a / 2
+    assert abs(solution.position("block")[-1, 0] - place) < 1e-14
+    assert solution.sticking("floor")[-1] == holds
+    np.testing.assert_allclose(solution.reaction("floor")[0][-1, 0], -2 * a if holds else 0.0, rtol=1e-14, atol=1e-14)
+
+
 def test_slip_across_a_slope_turns_down_it():
     """With mu = tan(angle) the speed and the velocity down the slope have a constant sum; it ends in half of it."""
     solution = ts.simulate(slope(np.tan(0.3), 0.3, (0, 2, 0)), (0, 30), rtol=1e-11, atol=1e-12)

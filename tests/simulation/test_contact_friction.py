@@ -475,6 +475,23 @@ def test_a_block_on_a_belt():
     assert solution.sticking("grip")[-1]
 
 
+@pytest.mark.parametrize("mu", [0.1, 0.2])
+def test_a_light_box_slips_on_a_plate_that_shakes(mu):
+    """A w^2 = 5 m/s^2; with all four corners at their bounds, three of them alone find no reactions."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    plate = scene.add_body(5.0, (1, 1, 1), velocity=(0.5, 0, 0))
+    way = scene.add(C.Translational.at(scene.ground, plate, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(C.TranslationMotor.of(way, displacement=ts.motions.Sine(0.05, 10.0)))
+    box = scene.add_body(1.0, (0.01, 0.01, 0.01), (0, 0, 0.02), velocity=(0.5, 0, 0), name="box")
+    for corner in ((-0.3, -0.3, -0.02), (-0.3, 0.3, -0.02), (0.3, -0.3, -0.02), (0.3, 0.3, -0.02)):
+        scene.add(C.PlaneContact(box, plate, point_a=corner, normal_b=(0, 0, 1), unilateral=True, kinetic=mu))
+    solution = ts.simulate(scene, (0, 0.1), rtol=1e-12, atol=1e-12)
+    begin = np.arcsin(mu * G / 5.0) / 10.0
+    assert abs(solution.phases[0][1] - begin) < 1e-14
+    speed = 0.5 * np.cos(10.0 * begin) - mu * G * (0.1 - begin)
+    np.testing.assert_allclose(solution.velocity("box")[-1], [speed, 0, 0], rtol=1e-13, atol=1e-13)
+
+
 def test_painleves_rod_ends_with_an_account():
     """A rod that slides with its upper end ahead and mu > 4/3 has no reaction: 1 + 3 cos (cos - mu sin) < 0."""
     scene, a = ts.Scene(gravity=(0, 0, -G)), 1.0

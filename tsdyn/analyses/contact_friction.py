@@ -154,7 +154,10 @@ def _alone(inertia, found, qd, fired):
     which, seen, small = found.closed, [], LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
     while which not in seen:
         seen.append(which)
-        again, pulls = _solve(inertia, which, qd, fired)
+        try:
+            again, pulls = _solve(inertia, which, qd, fired)
+        except NoSolution:
+            return None
         left = {*found.closed, *found.idle}.difference(again.closed, again.idle)
         low = sorted(i for i in left if again.accelerations[i] <= small[i])
         idle = [i for i in low if depends(inertia, again.closed, i)]

@@ -155,7 +155,10 @@ def _alone(inertia, found, qd, fired):
     which, seen, small = found.closed, [], LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
     while which not in seen:
         seen.append(which)
-        again, pulls = _solve(inertia, which, qd, fired)
+        try:
+            again, pulls = _solve(inertia, which, qd, fired)
+        except NoSolution:
+            return None
         left = {*found.closed, *found.idle}.difference(again.closed, again.idle)
         low = sorted(i for i in left if again.accelerations[i] <= small[i])
         idle = [i for i in low if depends(inertia, again.closed, i)]
@@ -251,14 +254,15 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
         else:
             (idle if depends(inertia, closed, i) else closed).append(i)
         if gaps.rough[i]:
-            length = np.hypot(*T[j])
+            way = -T[j] if mu[j] > 0.0 else moves[j]  # the slip of a contact that sticks only begins without friction
+            length = np.hypot(*way)
             if slides[j]:
                 grips[i] = inertia.along(i, d[j])
             elif mode[j] == STICKS or not pushes or not length > 0.0:
                 grips[i] = None
             else:
-                grips[i] = inertia.along(i, -T[j] / length)
-                gain = -moves[j] @ T[j] / length
+                grips[i] = inertia.along(i, way / length)
+                gain = moves[j] @ way / length
                 begun |= {i: float(gain)} if gain > EVENT_ERROR * sizes[j].max() else {}
     alone = dict(zip(resting, b.reshape(-1, 3), strict=True))
     if by_rows:

@@ -370,6 +370,21 @@ def test_the_impulse_of_friction_of_one_impact():
         np.testing.assert_allclose(impulses["floor"].tangential, [expected, 0, 0], rtol=1e-13, atol=1e-15)
 
 
+@pytest.mark.parametrize("spin", [5e-4, 1e-3, 2e-3, 1e-2])
+def test_a_rod_that_turns_a_little_until_it_rests_stays_there(spin):
+    """It turns by 4e-8 to 2e-5 rad: the slip takes its direction anew before it ends, the same or another one."""
+    scene, L = ts.Scene(gravity=(0, 0, -G)), 1.0
+    given = {"position": (L / 2, 0, 0), "velocity": (0, spin * L / 2, 0), "angular_velocity": (0, 0, spin)}
+    rod = scene.add_body(1.0, (1e-3, L**2 / 12, L**2 / 12), **given, name="rod")
+    scene.add(C.Universal.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 0, 1), axis_b=(0, 1, 0)))
+    scene.add(C.PlaneContact(rod, scene.ground, point_a=(L / 2, 0, 0), **FLOOR, kinetic=0.2, name="floor"))
+    end = spin * (L**2 / 3) / (0.2 * G * L / 2)  # J w / (mu N L) with N = m g / 2
+    solution = ts.simulate(scene, (0, 3 * end), integrator="dop853")
+    assert abs(solution.phases[1][0] - end) < 1e-9 * end
+    assert solution.kinetic_energy[-1] == 0.0
+    assert np.diff(solution.kinetic_energy).max() <= 0.0
+
+
 def test_a_ball_that_bounces_with_backspin_comes_back():
     """Without slip after the first impact: v = (5 v_0 + 2 R w_0) / 7."""
     solution = ts.simulate(ball("sphere", (1, 0, 0), (0, -9, 0), mu=0.6, e=0.7, height=1.5), (0, 6))

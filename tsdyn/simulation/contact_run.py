@@ -360,6 +360,7 @@ class _ContactRun(Transitions, Checkpoints):
             return False
         run.now[1], self.decided = self.qd, None
         self.closing.open(self.modes.opened)
+        self.fast.clear()  # slips that have turned have their directions from here
         self.again.append(t)
         return True
 

@@ -10,6 +10,7 @@ joints tie slips to rates of gaps: coefficients of restitution are lowered toget
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import AHEAD, EVENT_ERROR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
+
+# Of `braced`: weights of the margin, most steps at each, the gain that ends them, shares of the largest reaction
+PATH, STEPS, SETTLED, MARGIN = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6), 30, 1e-14, 0.1
 
 
 def rows_of(inertia, which):
@@ -423,8 +427,15 @@ def _held(inertia, closed, grips, b, small):
     reactions are those, or what one contact alone would carry of the terms: in free fall all reactions are rounding.
     """
     (A, a), k = _holding(inertia, closed, grips, b), len(closed)
-    by = np.linalg.pinv(A, rcond=RANK_TOL**2)[:k]
-    pushes = -by @ a
+    by = np.linalg.pinv(A, rcond=RANK_TOL**2)
+    p, by = -by @ a, by[:k]
+    pushes, sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
+    if sticks:
+        at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
+        loads = inertia.free(rows_of(inertia, sticks).T).T
+        found = braced(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))
+        if found is not None:
+            pushes[at] = found[:, 0]
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
     return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
@@ -437,6 +448,63 @@ def _holding(inertia, closed, grips, b):
     loads = np.concatenate([_loads(inertia, closed, _ways(inertia, grips)), slips])
     rows = np.concatenate([inertia.J[closed], slips])
     return rows @ inertia.free(loads.T), np.array([*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])])
+
+
+def braced(static, loads, p):
+    """The same reactions p (c, 3) of contacts that stick, deep in their cones; None where normal parts are given.
+
+    loads (3 c, n): accelerations by unit reactions. Where slips depend on gaps, contacts brace each other, as those of
+    a ball with floor and wall along the line through both points. On the central path of the cone program
+
+        max t,  N - t >= |T| / mu,  t <= m:      min -w t - log(m - t) - sum log((N - t)^2 - |T|^2 / mu^2) + |p|^2 / 2
+
+    (Boyd and Vandenberghe, 2004, chapter 11) reactions are smooth, and differ from its end by some c / w, which two
+    weights w take away. So they are within their cones as long as any are. The squares bound them where contacts jam.
+    """
+    rows = np.linalg.norm(loads, axis=1)
+    if (static <= 0.0).any() or not (rows > 0.0).all():
+        return None
+    _, sizes, across = np.linalg.svd((loads / rows[:, None]).T)
+    free, size = across[np.count_nonzero(sizes > RANK_TOL * sizes.max()) :].T / rows[:, None], np.abs(p).max()
+    if not free.size or not size > 0.0 or np.abs(free[::3]).max() <= RANK_TOL * np.abs(free).max():
+        return None
+    free = np.linalg.qr(free)[0]
+    k, x = free.shape[1], p.ravel() / size
+    least = x - free @ (free.T @ x)
+    # u = u0 + B y, in units in which all cones are u_0 > |(u_1, u_2)|; y: shares of `free`, then t
+    scale = np.column_stack([np.ones(len(p)), 1.0 / static, 1.0 / static])
+    B = np.concatenate([free, np.tile([-1.0, 0.0, 0.0], len(p))[:, None]], axis=1).reshape(len(p), 3, k + 1)
+    B, start, metric = scale[:, :, None] * B, scale * least.reshape(-1, 3), np.array([1.0, -1.0, -1.0])
+    y, squares = np.zeros(k + 1), np.append(np.ones(k), 0.0)
+    most = MARGIN * np.abs(least).max()
+    y[k] = min((start[:, 0] - np.hypot(*start[:, 1:].T)).min(), most) - 1.0
+
+    def value(y, weight):
+        u = start + B @ y
+        left, rest = u * u @ metric, most - y[k]
+        if not ((left > 0.0).all() and (u[:, 0] > 0.0).all() and rest > 0.0):
+            return np.inf
+        return 0.5 * squares @ (y * y) - weight * y[k] - np.log(left).sum() - math.log(rest)
+
+    for weight in PATH:
+        before, now = y, value(y, weight)
+        for _ in range(STEPS):
+            u = start + B @ y
+            share, rest = 2.0 / (u * u @ metric), 1.0 / (most - y[k])
+            way = np.einsum("c,ci,cik->ck", share, metric * u, B)
+            slope = squares * y - way.sum(axis=0)
+            slope[k] += rest - weight
+            H = np.diag(squares) + way.T @ way - np.einsum("c,i,cij,cik->jk", share, metric, B, B)
+            H[k, k] += rest * rest
+            step, h = -np.linalg.solve(H, slope), 1.0
+            gain = -slope @ step
+            while (found := value(y + h * step, weight)) > now - 0.1 * h * gain and h > EVENT_ERROR:
+                h *= 0.5
+            y, now = y + h * step, found
+            if gain < SETTLED:
+                break
+    end = y + (y - before) / (PATH[-1] / PATH[-2] - 1.0)
+    return size * (least + free @ end[:k]).reshape(-1, 3)
 
 
 def spread(bounds, responses, T):

@@ -174,6 +174,14 @@ class Gaps:
         rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
         return self.workspace.respond(t, q, memory, rows).reshape(len(which), 2, -1)
 
+    def normals(self, t, q, which):
+        """Rows (k, n) of the gaps `which`."""
+        return self.sign[which, None] * self.workspace.rows(t, q, np.array(which))[0]
+
+    def normal_responses(self, t, q, memory, which):
+        """Accelerations (k, n) by unit pushes of these gaps, with all gaps open."""
+        return self.workspace.respond(t, q, memory, self.normals(t, q, which))
+
     def biases(self, gamma):
         """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""
         return np.where(self.rough[:, None], gamma[self._slips], 0.0)

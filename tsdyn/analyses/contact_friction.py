@@ -254,14 +254,16 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
         else:
             (idle if depends(inertia, closed, i) else closed).append(i)
         if gaps.rough[i]:
-            length = np.hypot(*T[j])
+            # What neither opens nor pushes has no friction: it slides where that takes it, and sticks where nothing does
+            way, rounding = (-T[j], 0.0) if pushes else (moves[j], LEVEL * sizes[j].max())
+            length = np.hypot(*way)
             if slides[j]:
                 grips[i] = inertia.along(i, d[j])
-            elif mode[j] == STICKS or not pushes or not length > 0.0:
+            elif (pushes and mode[j] == STICKS) or not length > rounding:
                 grips[i] = None
             else:
-                grips[i] = inertia.along(i, -T[j] / length)
-                gain = -moves[j] @ T[j] / length
+                grips[i] = inertia.along(i, way / length)
+                gain = moves[j] @ way / length
                 begun |= {i: float(gain)} if gain > EVENT_ERROR * sizes[j].max() else {}
     alone = dict(zip(resting, b.reshape(-1, 3), strict=True))
     if by_rows:

@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..analyses.contact_friction import braced, spread
+from ..analyses.contact_friction import shared
 from ..analyses.contact_problem import slip_rows
 from ..analyses.contact_rows import reaction_workspace
 from ..analyses.tolerances import EVENT_ERROR, LEAST_SLIP
@@ -135,18 +135,13 @@ def carried(gaps, which, t, q, memory, N, T):
 
     Friction is shared in proportion to N, but where reactions brace each other, see `braced`.
     """
-    N = N.copy()
-    rows = np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)  # at singular configurations N is NaN, too
-    T[rows] = np.nan_to_num(T[rows])
-    for k in np.flatnonzero(rows):
-        slips = gaps.responses(t[k], q[k], memory[k], which)
-        normals = gaps.normal_responses(t[k], q[k], memory[k], which)
-        loads = np.concatenate([normals[:, None], slips], axis=1).reshape(3 * len(which), -1)
-        p = braced(gaps.static[which], loads, np.column_stack([N[k], T[k]]))
-        if p is None:
-            T[k] = spread(gaps.static[which] * N[None, k], slips[None], T[None, k])[0]
-        else:
-            N[k], T[k] = p[:, 0], p[:, 1:]
+    N, T = N.copy(), T.copy()
+    for k in np.flatnonzero(
+        np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)
+    ):  # else at singular ones N is NaN
+        loads = gaps.responses(t[k], q[k], memory[k], which)
+        p = shared(gaps.static[which], loads.reshape(3 * len(which), -1), np.column_stack([N[k], np.nan_to_num(T[k])]))
+        N[k], T[k] = p[:, 0], p[:, 1:]
     return N, T
 
 

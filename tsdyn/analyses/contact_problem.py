@@ -171,10 +171,14 @@ class Gaps:
             found[k] = J @ qd[k] + drift[which]
         return self.sign[which] * found
 
+    def normals(self, t, q, which):
+        """Rows (k, n) of the gaps `which`."""
+        return self.sign[which, None] * self.workspace.rows(t, q, np.array(which))[0]
+
     def responses(self, t, q, memory, which):
-        """Accelerations (k, 2, n) by unit friction of these gaps, with all gaps open."""
-        rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
-        return self.workspace.respond(t, q, memory, rows).reshape(len(which), 2, -1)
+        """Accelerations (k, 3, n) by unit reactions of these gaps, normal and along both slips, with all gaps open."""
+        rows = np.concatenate([self.normals(t, q, which)[:, None], self.slopes(t, q, which)], axis=1)
+        return self.workspace.respond(t, q, memory, rows.reshape(3 * len(which), -1)).reshape(len(which), 3, -1)
 
     def biases(self, gamma):
         """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""

@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 
 from ..errors import InvalidConstraint
 from .code_hash import is_ours
-from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, letters, table
+from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, is_copy, letters, table
 from .compilers import current
 from .resident import (
     ANY,
@@ -95,8 +95,8 @@ def kernel(function, allocates=False, inline=True):
         )
     else:
         options = {**OPTIONS, "forceinline": inline}
-        if is_ours(function.__module__) and not DEBUG:
-            return Callee(function, options)
+    if not DEBUG and (is_copy(function) or (is_ours(function.__module__) and not allocates)):
+        return Callee(function, options, allocates)
     return function if DEBUG else numba.njit(**options, **current().options(allocates))(function)
 
 
@@ -143,6 +143,7 @@ def specialised(template, name, owner, make=kernel, **constants):
     code = template.__code__.replace(co_filename=owner.__code__.co_filename, co_name=name, co_qualname=name)
     copy = type(template)(code, {**known, **constants, **parts}, name)
     copy.__qualname__, copy.__module__ = name, owner.__module__
+    copy.is_copy = is_ours(known["__name__"])  # whatever module it claims to be of
     return copy
 
 

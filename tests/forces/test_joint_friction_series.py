@@ -36,6 +36,7 @@ def wheel(push, **more):
     return scene, body
 
 
+@pytest.mark.slow_for("ContactFriction")
 @pytest.mark.parametrize("kind", [F.RevoluteFriction, F.TranslationalFriction, F.ContactFriction])
 def test_the_series_are_those_of_the_law(kind):
     ts.testing.check_force(kind, states=1)

@@ -93,7 +93,7 @@ def test_chaplygins_sleigh(method):
     held(solution)
 
 
-@pytest.mark.slow_but("trapezoid")
+@pytest.mark.slow_but("nystrom4")
 @pytest.mark.parametrize(
     ("method", "order"),
     [(ts.integrators.ImplicitTrapezoid, 1.9), (ts.integrators.Radau, 4.8), (ts.integrators.Nystrom4, 3.8)],
@@ -167,6 +167,7 @@ def test_the_solver_agrees_with_dense_algebra(count):
     assert (mobility.degrees_of_freedom, mobility.position_degrees_of_freedom) == (2, count + 2)
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_to_the_bit(tmp_path, monkeypatch):
     """Stopped in its second slice, a stored run is resumed to the bits of a whole one."""
     monkeypatch.setattr(driver, "FIRST_SLICE", 4)
@@ -346,6 +347,7 @@ def test_a_plug_in_with_both_sorts_of_rows(method, speed):
     assert np.ptp(solution.energy - solution.work) < NEAR
 
 
+@pytest.mark.slow
 def test_the_checker_knows_rows_on_velocities():
     with pytest.warns(UserWarning, match=r"rate\[0\] is the derivative of a function of positions"):
         ts.testing.check_primitive(InPhi, states=1)
@@ -545,6 +547,7 @@ def test_kinematics_names_the_freedom_that_rows_on_velocities_leave():
         sleigh().kinematics([0.0, 1.0])
 
 
+@pytest.mark.slow
 def test_a_ball_on_its_head_rolls_over():
     """0.05 m of the centroid from the centre: m g c / (J + m (R - c)^2) about the stable pose, reached from the top."""
     scene = ts.Scene()

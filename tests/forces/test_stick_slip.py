@@ -320,6 +320,7 @@ def test_what_sticks_is_in_equilibrium():
         on_a_slope(1.1).equilibrium()
 
 
+@pytest.mark.slow
 def test_the_same_bits_in_another_process():
     script = textwrap.dedent("""
         import sys

@@ -203,6 +203,7 @@ def test_jacobian_of_the_null_space_form(name, rng):
     np.testing.assert_allclose(J, expected, rtol=0, atol=1e-8 * (1.0 + np.abs(expected).max() + np.abs(rates).max()))
 
 
+@pytest.mark.slow_for("sdirk54")
 @pytest.mark.parametrize("method", [I.RK45(1e-9, 1e-9), I.SDIRK54(1e-8, 1e-8)], ids=["rk45", "sdirk54"])
 def test_the_null_space_form_crosses_singular_configurations(method):
     """A parallelogram turns over and over beside a ball that rolls down a wall, at g / (1 + J / m R^2)."""

@@ -11,6 +11,7 @@ import tsdyn as ts
 from tests.helpers.contacts import G, bouncing, box, pendulum
 from tests.helpers.tolerances import EPS
 from tsdyn.simulation.contact_events import Reactions
+from tsdyn.simulation.phases import Phases
 
 C = ts.constraints
 
@@ -643,3 +644,12 @@ def test_a_scene_of_a_file(tmp_path):
     one, other = (ts.simulate(each, (0, 2.0)) for each in (scene, read))
     np.testing.assert_array_equal(one.q, other.q)
     assert len(one.impulses) > 1
+
+
+def test_a_flight_that_another_event_ends_ends_its_phase():
+    """From 1.0 s on, where contact was to begin at 1.4 s; at 1.2 s another contact closes."""
+    phases = Phases(None, None)
+    phases.add(0, 0.0, 0.0, 1.0, ("a",), ((), {}))
+    phases.add(1, 1.0, 1.4, 1.2, ("a", "b"), ((), {}))
+    phases.add(2, 1.2, 1.2, 2.0, ("b",), ((), {}))
+    assert phases.merged() == [(0.0, 1.2, ("a",)), (1.2, 2.0, ("b",))]

@@ -168,16 +168,16 @@ class Frictions:
         slip_velocities(q, qd, self.table, self.points, self.axes, v, sizes, axes)
         return v.reshape(-1, self.count, 3), sizes, axes.reshape(-1, self.count, 3)
 
-    def sizes(self, q, qd):
+    def sizes(self, q, qd, length):
         """What rounding of velocities at q, qd (n,) is a share of (units,): sizes of their terms.
 
-        Joints couple rates of turning to the velocities of their bodies: these count, over the scene's size.
+        Joints couple rates of turning to the velocities of their bodies: these count, over the scene's length, m.
         """
         if not self.count:
             return np.zeros(0)
         sizes, r = self.motions(q[None], qd[None])[1][0], self.packed.system.bodies[:, :1] + np.arange(3)
         passing = np.append(np.linalg.norm(qd[r], axis=1), 0.0)[self.ends].sum(axis=1)
-        return sizes + np.where(self.turns, passing, 0.0) / (self.packed.size or np.inf)
+        return sizes + np.where(self.turns, passing, 0.0) / (length or np.inf)
 
     def turn(self, t, levels, memory):
         """Write the directions of slip into memory (k, slots), zero where a slip rate is zero to rounding.

@@ -77,6 +77,7 @@ class SearchNumbers(Record):
     place: int  # of the next time that is read, as of `dense_output.read`
     t0: float  # s, the step
     t1: float
+    just: float  # its end, but just before it where loads may jump there
     new: int  # whether no step has been searched since the run has begun
     found: int  # the function that is zero first
     t: float  # when, s
@@ -161,7 +162,7 @@ def _evaluate_within(s, step, t, whole, out):
     read = read_one(s.numbers.reader, step.context, step.run, step.block, step.charts, step.points, t, asked, s.state)
     if read != 0:
         return False
-    _evaluate(s, step.first, step.second, t, s.state, step.t0, step.before, out)
+    _evaluate(s, step.first, step.second, min(t, s.numbers.just), s.state, step.t0, step.before, out)
     return True
 
 
@@ -230,7 +231,7 @@ def _survey(s, step, t0, t1, turning, roughly):
                 continue
             t = t1 if i == N + 1 else t0 + 0.5 * (t1 - t0) * (table.points[i] + 1.0)
             if t == step.t1:
-                _evaluate(s, step.first, step.second, t, step.now, step.t0, step.before, samples[i])
+                _evaluate(s, step.first, step.second, s.numbers.just, step.now, step.t0, step.before, samples[i])
             elif roughly:
                 _follow(step, t, s.state)
                 _evaluate(s, step.first, step.second, t, s.state, step.t0, step.before, samples[i])
@@ -503,6 +504,7 @@ class GroupSearch:
         """
         numbers, reader, known = self.numbers, step.reader, step.known
         numbers.t0, numbers.t1, (numbers.reader, context, run), numbers.new = step.t0, step.t1, reader.where, is_new
+        numbers.just = step.just
         self._enter(step.near, step.memory)
         contexts = self.address, context, run, *self.contexts
         found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)

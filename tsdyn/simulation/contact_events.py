@@ -121,7 +121,7 @@ class Reactions(KernelFunctions):
         held = N[:, self.which]
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
         memory = np.tile(states.memory, (states.t.size, 1))
-        T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
+        N[:, self.which], T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
         N = N + self.slack
         return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
 

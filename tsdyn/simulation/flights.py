@@ -22,6 +22,7 @@ from ..runs.events import NOT_BEGUN, UNBEGUN, UNSEARCHED
 from ..runs.group_search import CLEAR, FOUND, StepArrays, begin_functions, call_find, load_search, take_step
 from ..runs.run_log import no_log
 from ..runs.run_memory import STATUSES, begin_again, call_driver, end_run, end_step, go_back, load_restart
+from ..runs.stepper import is_at_stop
 from ..runs.tolerances import LONG_STEPS, START_ZERO
 from ..workspaces import load_run
 from .tolerances import ACCUMULATED, EVENTS_JUDGED, FLIGHT, PENETRATION, PUSHED, ROUNDED
@@ -160,13 +161,16 @@ def fly(flight, log, most):
         n.used += 1
         status = call_driver(n.driver, n.context, n.run, at, 1)
         if r.numbers.steps > steps:
+            if is_at_stop(r, log):  # where loads may jump
+                n.ended = UNSEARCHED
+                return status
             arrays = StepArrays(f.before, r.now, r.block, log.charts, log.points)
             found = CLEAR
             for k in range(f.searches.shape[0]):
                 s = load_search(f.searches[k, 0])
                 copy(f.remembered[: s.near.size], s.near)
                 copy(r.remembered[angles : angles + s.memory.size], s.memory)
-                s.numbers.t0, s.numbers.t1, s.numbers.new = n.t0, r.clock.t, n.new
+                s.numbers.t0, s.numbers.t1, s.numbers.just, s.numbers.new = n.t0, r.clock.t, r.clock.t, n.new
                 given = n.reader, n.read_run, f.searches[k, 1], f.searches[k, 2]
                 found = call_find(s.numbers.finder, f.searches[k, 0], *given, seen(arrays))
                 if found != CLEAR:

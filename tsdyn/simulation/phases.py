@@ -209,6 +209,8 @@ class Phases:
             before = changes
             if end <= start < self.list[-1][1]:
                 continue
+            if found and found[-1][1] > start:  # another event came before flights of that phase were to end
+                found[-1] = (found[-1][0], start, found[-1][2])
             if found and names == found[-1][2] and not struck:
                 found[-1] = (found[-1][0], end, names)
             else:

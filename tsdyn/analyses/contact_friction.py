@@ -21,8 +21,9 @@ from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, 
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import AHEAD, EVENT_ERROR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
 
-# Of `shared`: weights of the margin, most steps at each, the gain that ends them, shares of the largest reaction
-PATH, STEPS, SETTLED, MARGIN = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6), 30, 1e-9, 0.1
+# Of `shared`: weights of the margin, most steps at each, the gain that ends them; shares of the largest reaction, of
+# the margin that is deep and of what the end of the path is right to, where some reactions are zero
+PATH, STEPS, SETTLED, MARGIN, PATH_ERROR = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7), 30, 1e-9, 0.1, 1e-8
 
 
 def rows_of(inertia, which):
@@ -431,13 +432,17 @@ def _held(inertia, closed, grips, b, small):
     by = least_squares(A, np.eye(len(A)), RANK_TOL**2)
     p, by = -by @ a, by[:k]
     pushes, sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
+    braced = np.zeros(k, bool)
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
         loads = inertia.free(rows_of(inertia, sticks).T).T
+        before = pushes.copy()
         pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
+        braced = pushes != before
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
-    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
+    rounding = np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
+    return pushes, np.where(braced, np.maximum(rounding, PATH_ERROR * largest), rounding)
 
 
 def _holding(inertia, closed, grips, b):

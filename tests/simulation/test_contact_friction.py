@@ -707,28 +707,3 @@ def test_joints_carry_friction_that_blocks_share(who, mu):
     for rod, a, pull in zip(rods, blocks, 12 - np.cumsum(T), strict=False):
         load = np.atleast_2d(found.reaction(rod, on=a)[0])[-1]
         np.testing.assert_allclose(load, (pull, 0, 0), atol=1e-12)
-
-
-@pytest.mark.parametrize("order", [1, -1])
-@pytest.mark.parametrize("pull", [-1.0, 0.1])
-def test_a_ball_that_braces_itself_between_floor_and_wall_rests(order, pull):
-    """A torque presses it to the wall, which it would leave by gravity alone: for any friction a of the floor.
-
-    Floor (-a, 7 + a), wall (a - pull, 2 - a).
-    """
-    scene, mu = ts.Scene(gravity=(pull, 0, -9)), 0.3
-    ball = scene.add_body(**ts.shapes.sphere(0.1, mass=1.0), position=(0.1, 0, 0.1))
-    for name, normal in (("floor", (0, 0, 1)), ("wall", (1, 0, 0)))[::order]:
-        law = {"radius_a": 0.1, "normal_b": normal, "kinetic": mu, "name": name}
-        scene.add(C.SphereContact(ball, scene.ground, **law))
-    scene.add(ts.forces.Torque(ball, torque=(0, -0.2, 0)))
-    solution = ts.simulate(scene, (0, 1)).raise_if_failed()
-    np.testing.assert_array_equal(solution.position(ball), np.tile([0.1, 0, 0.1], (solution.t.size, 1)))
-    floor, wall = (solution.reaction(name)[0] for name in ("floor", "wall"))
-    a = -floor[:, 0]
-    zero = np.zeros_like(a)
-    np.testing.assert_allclose(floor, np.column_stack([-a, zero, 7.0 + a]), atol=1e-12)
-    np.testing.assert_allclose(wall, np.column_stack([a - pull, zero, 2.0 - a]), atol=1e-12)
-    for N, T in ((floor[:, 2], floor[:, 0]), (wall[:, 0], wall[:, 2])):
-        assert (N > 0.0).all()
-        assert (np.abs(T) <= mu * N).all()

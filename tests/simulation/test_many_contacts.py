@@ -61,6 +61,23 @@ def test_a_stack_of_boxes_falls_and_comes_to_rest(count, rough):
         np.testing.assert_allclose(force, [0, 0, (count - i) * G], atol=1e-9 * count)
 
 
+def balls_over_a_box(count, seed, half, width, **law):
+    """Balls of radius 0.1 over each other, with centres within +-width; a floor and four walls half away."""
+    radius, scene, rng = 0.1, ts.Scene(gravity=(0, 0, -G)), np.random.default_rng(seed)
+    balls = []
+    for i in range(count):
+        place = (rng.uniform(-width, width), rng.uniform(-width, width), 0.15 + 0.25 * i)
+        balls.append(scene.add_body(**ts.shapes.sphere(radius, mass=1.0), position=place))
+    for i, ball in enumerate(balls):
+        sides = [((0, 0, 0), (0, 0, 1))]
+        sides += [(tuple(-half * np.array(n)), n) for n in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))]
+        for at, n in sides:
+            scene.add(C.SphereContact(ball, scene.ground, radius_a=radius, center_b=at, normal_b=n, **law))
+        for other in balls[:i]:
+            scene.add(C.SphereContact(ball, other, radius_a=radius, radius_b=radius, **law))
+    return scene
+
+
 @pytest.mark.parametrize(
     ("count", "e", "seed", "half"),
     [
@@ -74,18 +91,8 @@ def test_balls_fall_into_a_box(count, e, seed, half):
 
     At the end floor and walls carry the weight and what accelerates the balls.
     """
-    radius, scene, rng = 0.1, ts.Scene(gravity=(0, 0, -G)), np.random.default_rng(seed)
-    balls = []
-    for i in range(count):
-        place = (rng.uniform(-0.15, 0.15), rng.uniform(-0.15, 0.15), 0.15 + 0.25 * i)
-        balls.append(scene.add_body(**ts.shapes.sphere(radius, mass=1.0), position=place))
-    for i, ball in enumerate(balls):
-        sides = [((0, 0, 0), (0, 0, 1))]
-        sides += [(tuple(-half * np.array(n)), n) for n in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))]
-        for at, n in sides:
-            scene.add(C.SphereContact(ball, scene.ground, radius_a=radius, center_b=at, normal_b=n, restitution=e))
-        for other in balls[:i]:
-            scene.add(C.SphereContact(ball, other, radius_a=radius, radius_b=radius, restitution=e))
+    radius, scene = 0.1, balls_over_a_box(count, seed, half, 0.15, restitution=e)
+    balls = scene.bodies
     solution = ts.simulate(scene, (0, 2.0))
     assert solution.success, solution.message
     x = np.array([solution.position(ball) for ball in balls])
@@ -97,6 +104,35 @@ def test_balls_fall_into_a_box(count, e, seed, half):
     force = sum(solution.reaction(c)[0][-1] for c in resting if c.b is scene.ground)
     rises = sum(solution.acceleration(ball)[-1] for ball in balls)
     np.testing.assert_allclose(force, rises + np.array([0, 0, count * G]), atol=1e-9 * count * G)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "seed"), [(4, 1), *((6, seed) for seed in range(3))])
+def test_rough_balls_fall_into_a_box(count, seed):
+    """They brace each other between floor and walls: reactions that aren't unique lie within the cones.
+
+    Energy never rises; at the end reactions balance weights and accelerations.
+    """
+    mu, half = 0.3, 0.23 if count == 4 else 0.33
+    scene = balls_over_a_box(count, seed, half, half - 0.15, kinetic=mu)
+    solution = ts.simulate(scene, (0, 2.0)).raise_if_failed()
+    assert np.diff(solution.energy).max() < 1e-12 * count * G
+    net = {ball: np.tile([0.0, 0.0, -G], (solution.t.size, 1)) for ball in scene.bodies}
+    for contact in scene.constraints:
+        if not isinstance(contact, C.SphereContact):
+            continue
+        load = solution.reaction(contact)[0]
+        net[contact.a] += load
+        if contact.b is scene.ground:
+            normal = np.tile(contact.normal_b, (solution.t.size, 1))
+        else:
+            net[contact.b] -= load
+            normal = (solution.position(contact.a) - solution.position(contact.b)) / 0.2
+        N = (load * normal).sum(axis=1)
+        assert N.min() > -1e-8 * count * G
+        assert (np.linalg.norm(load - N[:, None] * normal, axis=1) - mu * N).max() < 1e-8 * count * G
+    for ball, force in net.items():
+        np.testing.assert_allclose(solution.acceleration(ball)[-1], force[-1], atol=1e-8 * G)
 
 
 @pytest.mark.slow

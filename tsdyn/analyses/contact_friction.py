@@ -21,8 +21,9 @@ from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, 
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import AHEAD, EVENT_ERROR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
 
-# Of `shared`: weights of the margin, most steps at each, the gain that ends them, shares of the largest reaction
-PATH, STEPS, SETTLED, MARGIN = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6), 30, 1e-9, 0.1
+# Of `shared`: weights of the margin, most steps at each, the gain that ends them; shares of the largest reaction, of
+# the margin that is deep and of what the end of the path is right to, where some reactions are zero
+PATH, STEPS, SETTLED, MARGIN, PATH_ERROR = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7), 30, 1e-9, 0.1, 1e-8
 
 
 def rows_of(inertia, which):
@@ -435,13 +436,17 @@ def _held(inertia, closed, grips, b, small):
     by = least_squares(A, np.eye(len(A)), RANK_TOL**2)
     p, by = -by @ a, by[:k]
     pushes, sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
+    braced = np.zeros(k, bool)
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
         loads = inertia.free(rows_of(inertia, sticks).T).T
+        before = pushes.copy()
         pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
+        braced = pushes != before
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
-    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
+    rounding = np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
+    return pushes, np.where(braced, np.maximum(rounding, PATH_ERROR * largest), rounding)
 
 
 def _holding(inertia, closed, grips, b):
@@ -466,6 +471,7 @@ def shared(static, loads, p):
 
     (Boyd and Vandenberghe, 2004, chapter 11) reactions are smooth, and differ from its end by some c / w, which two
     weights w take away. So they are within their cones as long as any are. The squares bound them where contacts jam.
+    Reactions with the least friction stay as they are where they are deep enough.
     """
     size, free = np.abs(p).max(initial=0.0), _null_space(loads.T)
     if not size > 0.0 or not free.size:
@@ -474,13 +480,18 @@ def shared(static, loads, p):
         return _in_proportion(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p)
     k, x = free.shape[1], p.ravel() / size
     least = x - free @ (free.T @ x)
+    across = free.reshape(-1, 3, k)[:, 1:].reshape(-1, k)
+    least = (least - free @ least_squares(across, least.reshape(-1, 3)[:, 1:].ravel(), RANK_TOL)).reshape(-1, 3)
     # u = u0 + B y, in units in which all cones are u_0 > |(u_1, u_2)|; y: shares of `free`, then t
     scale = np.column_stack([np.ones(len(p)), 1.0 / static, 1.0 / static])
     B = np.concatenate([free, np.tile([-1.0, 0.0, 0.0], len(p))[:, None]], axis=1).reshape(len(p), 3, k + 1)
-    B, start, metric = scale[:, :, None] * B, scale * least.reshape(-1, 3), np.array([1.0, -1.0, -1.0])
+    some = np.abs(B[:, :, :k]).max(axis=(1, 2)) > RANK_TOL
+    B, start, metric = scale[some, :, None] * B[some], (scale * least)[some], np.array([1.0, -1.0, -1.0])
     y, squares = np.zeros(k + 1), np.append(np.ones(k), 0.0)
-    most = MARGIN * np.abs(least).max()
-    y[k] = min((start[:, 0] - np.hypot(*start[:, 1:].T)).min(), most) - 1.0
+    most, margin = MARGIN * np.abs(least).max(), (start[:, 0] - np.hypot(*start[:, 1:].T)).min()
+    if margin >= most:
+        return size * least
+    y[k] = margin - 1.0
 
     def value(y, weight):
         u = start + B @ y
@@ -507,7 +518,8 @@ def shared(static, loads, p):
             if gain < SETTLED:
                 break
     end = y + (y - before) / (PATH[-1] / PATH[-2] - 1.0)
-    return size * (least + free @ end[:k]).reshape(-1, 3)
+    part = min(2.0 * (1.0 - margin / most), 1.0)  # of the way: reactions are continuous
+    return size * (least + part * (free @ end[:k]).reshape(-1, 3))
 
 
 def _null_space(A):

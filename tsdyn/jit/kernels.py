@@ -88,7 +88,7 @@ def kernel(function, allocates=False, inline=True):
     8.0
     """
     if allocates:
-        options = {**OPTIONS, "boundscheck": True}
+        options = {**OPTIONS, "boundscheck": True, "forceinline": is_copy(function)}  # tsdyn's own part is inlined
     elif RAISE in function.__code__.co_code[::2]:  # every second byte is an operation
         raise InvalidConstraint(
             f"{function.__qualname__}: a kernel can't raise or assert; write nan where there is no value."

@@ -475,6 +475,17 @@ def test_a_block_on_a_belt():
     assert solution.sticking("grip")[-1]
 
 
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_point_rests_on_a_ball_and_in_a_bowl(inside):
+    scene, turn = ts.Scene(), np.pi if inside else 0.0
+    place = [np.sin(0.2 + turn), 0, np.cos(0.2 + turn)]
+    body = scene.add_body(2.0, (0.1, 0.1, 0.1), place, name="body")
+    scene.add(C.SphereContact(body, scene.ground, radius_a=0.0, radius_b=1.0, inside=inside, kinetic=0.5, name="rough"))
+    solution = ts.simulate(scene, (0, 0.1), t_eval=[0.0])
+    np.testing.assert_allclose(solution.friction_demand("rough"), np.tan(0.2), rtol=1e-14)
+    np.testing.assert_allclose(solution.contact_point("rough"), [place], rtol=0.0, atol=1e-15)
+
+
 @pytest.mark.parametrize("mu", [0.1, 0.2])
 def test_a_light_box_slips_on_a_plate_that_shakes(mu):
     """A w^2 = 5 m/s^2; with all four corners at their bounds, three of them alone find no reactions."""

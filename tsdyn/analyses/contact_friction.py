@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..maths.complementarity import OPEN, STICKS, solve_cone
+from ..maths.dense_solve import least_squares, product
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import AHEAD, EVENT_ERROR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
@@ -37,7 +38,7 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
     """The `Struck` of an impact of the gaps `which`; rates (k,) before, restitution (k,). Raises NoSolution."""
     rows = rows_of(inertia, which)
     response = inertia.free(rows.T)
-    G, mu, rounding = rows @ response, inertia.gaps.kinetic[which], SUM_ROUNDING * inertia.sizes(qd).max()
+    G, mu, rounding = product(rows, response), inertia.gaps.kinetic[which], SUM_ROUNDING * inertia.sizes(qd).max()
     before = np.column_stack([rates, inertia.slips(qd)[which]]).ravel()
     normal = np.arange(0, before.size, 3)
 
@@ -232,13 +233,13 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd)
     response = inertia.free(cones.rows.T)
-    G, c, terms = cones.rows @ response, cones.open, cones.terms
+    G, c, terms = product(cones.rows, response), cones.open, cones.terms
     b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
     p, mode, mu = cones.solve(G, b)
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
-    small, carried = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p)), inertia.carried()
+    small, carried = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)), inertia.carried()
     mode = _sharing(G, b, p, mode, cones, response)
     moves, sizes = ((A @ x + y).reshape(-1, 3)[:, 1:] for A, x, y in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
     closed, idle, spare, grips, begun = [], [], [], {}, {}
@@ -387,8 +388,8 @@ def halted(inertia, qd, resting, which):
     tangents = inertia.tangents[held].reshape(2 * len(held), -1)
     response = inertia.free(np.concatenate([loads, tangents]).T)
     left = np.concatenate([np.zeros(len(resting)), tangents @ qd])
-    G = np.concatenate([inertia.J[resting], tangents]) @ response
-    return qd - response @ np.linalg.lstsq(G, left, rcond=RANK_TOL**2)[0]
+    G = product(np.concatenate([inertia.J[resting], tangents]), response)
+    return qd - response @ least_squares(G, left, RANK_TOL**2)
 
 
 def slow_speeds(inertia, qd, terms):
@@ -427,7 +428,7 @@ def _held(inertia, closed, grips, b, small):
     reactions are those, or what one contact alone would carry of the terms: in free fall all reactions are rounding.
     """
     (A, a), k = _holding(inertia, closed, grips, b), len(closed)
-    by = np.linalg.pinv(A, rcond=RANK_TOL**2)[:k]
+    by = least_squares(A, np.eye(len(A)), RANK_TOL**2)[:k]
     pushes = -by @ a
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
@@ -440,7 +441,9 @@ def _holding(inertia, closed, grips, b):
     slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
     loads = np.concatenate([_loads(inertia, closed, _ways(inertia, grips)), slips])
     rows = np.concatenate([inertia.J[closed], slips])
-    return rows @ inertia.free(loads.T), np.array([*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])])
+    return product(rows, inertia.free(loads.T)), np.array(
+        [*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])]
+    )
 
 
 def spread(bounds, responses, T):
@@ -454,7 +457,6 @@ def spread(bounds, responses, T):
     rows = responses.reshape(k, 2 * c, -1)
     loads = np.einsum("kr,krn->kn", T.reshape(k, 2 * c), rows)
     found = [
-        w * np.linalg.lstsq((w[:, None] * A).T, load, rcond=RANK_TOL)[0]
-        for w, A, load in zip(weight, rows, loads, strict=True)
+        w * least_squares((w[:, None] * A).T, load, RANK_TOL) for w, A, load in zip(weight, rows, loads, strict=True)
     ]
     return np.array(found).reshape(k, c, 2)

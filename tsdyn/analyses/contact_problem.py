@@ -20,6 +20,7 @@ from ..configuration.tolerances import INITIAL_TOL
 from ..elements.bodies import turning
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
+from ..maths.dense_solve import least_squares, product
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
 from ..model.handles import all_angles, counted, displacement, first_rows, handles_of, index_of
 from ..model.handles import angle as angle_of
@@ -249,7 +250,7 @@ class Inertia:
         self.J, self.response, self.G = (np.zeros((gaps.count, size)) for size in (q.size, q.size, gaps.count))
         response = gaps.workspace.respond(t, q, slots, self._rows)
         self.J[self.which], self.response[self.which] = self._rows, response  # M~ J^T, transposed
-        self.G[self.which[:, None], self.which] = self._rows @ response.T
+        self.G[self.which[:, None], self.which] = product(self._rows, response.T)
         self._sizes, self.tangents = np.abs(self._rows), np.zeros((gaps.count, 2, q.size))
         self._more = 0.0 if loads is None else self.free(loads)
         frictional = self.which[gaps.rough[self.which]]
@@ -286,7 +287,7 @@ class Inertia:
 
     def hold(self, which, rates):
         """Impulses (k,) that take these rates from these gaps; negative ones pull."""
-        return -np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
+        return -least_squares(self.among(which), rates, RANK_TOL**2)
 
     def slips(self, qd):
         """Velocities (count, 2) of the slips, zero where they are rounding."""
@@ -442,6 +443,6 @@ def depends(inertia, closed, i, sticks=()):
     if len(sticks):
         slips = inertia.tangents[sticks].reshape(2 * len(sticks), -1)
         rows, loads = np.concatenate([rows, slips]), np.concatenate([loads, inertia.free(slips.T).T])
-    share = np.linalg.lstsq(rows @ loads.T, rows @ own, rcond=RANK_TOL**2 if len(sticks) else None)[0]
+    share = least_squares(product(rows, loads.T), rows @ own, RANK_TOL**2)
     left = own - share @ loads
     return bool(np.linalg.norm(left) <= RANK_TOL * np.linalg.norm(own))

@@ -14,6 +14,7 @@ from ..errors import (
     Status,
 )
 from ..jit.kernels import twin
+from ..maths.dense_solve import product
 from ..maths.tolerances import EPS, NEGLIGIBLE, RANK_TOL
 from ..model.handles import handles_of
 from ..observables.generalised_forces import force_loads
@@ -353,7 +354,7 @@ class Transitions:
         for k, numbers in enumerate(place.numbers(i, basis)):
             memory[np.array(unit.held(k))] = numbers
         rows = gradients(packed, self.t, self.q, memory)[packed.derived.holds[unit.slot]]
-        return rows @ self.gaps.workspace.respond(self.t, self.q, memory, rows).T
+        return product(rows, self.gaps.workspace.respond(self.t, self.q, memory, rows).T)
 
     def _motions_of(self, place, i):
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""

@@ -234,7 +234,7 @@ class SphereRolling(Primitive):
     def contact(x, par):
         """Contact point and normal towards a, (3, k) each, of marker coordinates x (len(x), k)."""
         d = x[:3] - x[B : B + 3]
-        return x[:3] - par[1] * d, np.sign(par[1]) * d / par[0]
+        return x[:3] - par[1] * d, np.copysign(1.0, par[1]) * d / par[0]
 
     @classmethod
     def example(cls, rng, a, b):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import inspect
 import math
 import os
 import stat
@@ -278,6 +279,22 @@ def demand(fits, what):
     """Raise ValueError unless something of a file fits."""
     if not fits:
         raise ValueError(f"{what}: no run leaves such values")
+
+
+def demand_arguments(function, what, names):
+    """Raise InvalidArgument unless a function can be called with so many arguments by position."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # of a builtin
+        return
+    try:
+        signature.bind(*names)
+    except TypeError as error:
+        name = getattr(function, "__name__", type(function).__name__)
+        raise InvalidArgument(
+            f"{what} is called with ({', '.join(names)}), and {name}{signature} can't be: {error}. Others than "
+            f"{'this argument' if len(names) == 1 else 'these arguments'} need defaults."
+        ) from None
 
 
 def is_count(value):

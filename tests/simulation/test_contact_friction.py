@@ -77,18 +77,6 @@ def test_a_block_that_slides_up_stops_or_comes_back(static):
     assert solution.sticking("floor")[-1] == (static is not None)
 
 
-@pytest.mark.parametrize("angle", [0.2, 0.4])
-@pytest.mark.parametrize("speed", [0.0, -1.0])
-def test_a_contact_that_slides_without_friction_sticks_up_to_its_static_bound(angle, speed):
-    """tan(0.2) = 0.203 is below it, tan(0.4) = 0.423 above."""
-    solution = ts.simulate(slope(0.0, angle, (speed, 0, 0), static=0.3), (0, 1))
-    a, holds = G * np.sin(angle), angle < 0.3
-    place = -(speed**2) / (2 * a) if holds else speed + a / 2
-    assert abs(solution.position("block")[-1, 0] - place) < 1e-14
-    assert solution.sticking("floor")[-1] == holds
-    np.testing.assert_allclose(solution.reaction("floor")[0][-1, 0], -2 * a if holds else 0.0, rtol=1e-14, atol=1e-14)
-
-
 def test_slip_across_a_slope_turns_down_it():
     """With mu = tan(angle) the speed and the velocity down the slope have a constant sum; it ends in half of it."""
     solution = ts.simulate(slope(np.tan(0.3), 0.3, (0, 2, 0)), (0, 30), rtol=1e-11, atol=1e-12)
@@ -488,23 +476,6 @@ def test_a_block_on_a_belt():
     assert abs(solution.position("block")[-1, 0] - (0.375 + 1.5 * 1.5)) < 1e-12
     assert solution.phases[-1][2] == ("grip",)
     assert solution.sticking("grip")[-1]
-
-
-@pytest.mark.parametrize("mu", [0.1, 0.2])
-def test_a_light_box_slips_on_a_plate_that_shakes(mu):
-    """A w^2 = 5 m/s^2; with all four corners at their bounds, three of them alone find no reactions."""
-    scene = ts.Scene(gravity=(0, 0, -G))
-    plate = scene.add_body(5.0, (1, 1, 1), velocity=(0.5, 0, 0))
-    way = scene.add(C.Translational.at(scene.ground, plate, point=(0, 0, 0), axis=(1, 0, 0)))
-    scene.add(C.TranslationMotor.of(way, displacement=ts.motions.Sine(0.05, 10.0)))
-    box = scene.add_body(1.0, (0.01, 0.01, 0.01), (0, 0, 0.02), velocity=(0.5, 0, 0), name="box")
-    for corner in ((-0.3, -0.3, -0.02), (-0.3, 0.3, -0.02), (0.3, -0.3, -0.02), (0.3, 0.3, -0.02)):
-        scene.add(C.PlaneContact(box, plate, point_a=corner, normal_b=(0, 0, 1), unilateral=True, kinetic=mu))
-    solution = ts.simulate(scene, (0, 0.1), rtol=1e-12, atol=1e-12)
-    begin = np.arcsin(mu * G / 5.0) / 10.0
-    assert abs(solution.phases[0][1] - begin) < 1e-14
-    speed = 0.5 * np.cos(10.0 * begin) - mu * G * (0.1 - begin)
-    np.testing.assert_allclose(solution.velocity("box")[-1], [speed, 0, 0], rtol=1e-13, atol=1e-13)
 
 
 def test_painleves_rod_ends_with_an_account():

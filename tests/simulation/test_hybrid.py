@@ -599,6 +599,9 @@ def test_what_isnt_an_action_and_what_cant_come_and_go():
     scene, (driver, _) = rotors()
     with pytest.raises(ts.InvalidArgument, match="action must be a function"):
         ts.simulate(scene, (0, 1), events=at(1.0, "clutch"))
+    for action in (lambda: None, lambda t, change: None):
+        with pytest.raises(ts.InvalidArgument, match=r"action is called with \(change\)"):
+            ts.simulate(scene, (0, 1), events=at(2.0, action))  # beyond the end
     rotor = scene.add(F.Armature(driver, inertia=1.0))
     for item, said in ((rotor, "inertia"), ("driver", "is a body"), ("nothing", "nothing"), (scene.ground, "ground")):
         with pytest.raises(ts.InvalidArgument, match=said):

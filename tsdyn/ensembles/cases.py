@@ -13,25 +13,9 @@ from ..observables.channels import channels_of, values_of
 from ..runs.task import state_arrays
 from ..simulation.parameters import fields_of, unknown_field
 from ..simulation.variants import start_names, start_of
-from ..validation import counted, floats, shown, whole
+from ..validation import counted, demand_arguments, floats, shown, whole
 
-# Functions of a user that an ensemble calls: whether they take what they are given, and what they raise.
-
-
-def demand_arguments(function, what, names):
-    """Raise InvalidArgument unless a function can be called with so many arguments by position."""
-    try:
-        signature = inspect.signature(function)
-    except (TypeError, ValueError):  # of a builtin
-        return
-    try:
-        signature.bind(*names)
-    except TypeError as error:
-        name = getattr(function, "__name__", type(function).__name__)
-        raise InvalidArgument(
-            f"{what} is called with ({', '.join(names)}), and {name}{signature} can't be: {error}. Others than "
-            f"{'this argument' if len(names) == 1 else 'these arguments'} need defaults."
-        ) from None
+# What functions of a user raise that an ensemble calls.
 
 
 def called(function, what, argument):

@@ -17,8 +17,8 @@ from ..simulation.run_options import OPTIONS, demand_arguments_of_file, from_nam
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
 from ..simulation.termination import bar_class
-from ..validation import damaged, demand, demand_record, sequence, whole
-from .cases import FINAL, TIMES, Cases, cases_of, demand_arguments, demand_whole, started
+from ..validation import damaged, demand, demand_arguments, demand_record, sequence, whole
+from .cases import FINAL, TIMES, Cases, cases_of, demand_whole, started
 from .executors import Collected, run_executor, run_threads
 from .results import FORMAT, REDUCED, Ensemble
 from .runner import CaseWorkspace, Study

@@ -16,7 +16,7 @@ from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import all_angles, counted, handles_of
 from ..model.joint_turns import find_counted_angles
 from ..observables.state import EventInstant
-from ..validation import demand, demand_numbers, is_count, number
+from ..validation import demand, demand_arguments, demand_numbers, is_count, number
 from . import tolerances as limits
 from .event_groups import Group, GroupMember, States
 from .run_memory import Memory, end_run
@@ -83,6 +83,8 @@ def prepare(events):
         action = getattr(function, "action", None)
         if action is not None and not callable(action):
             raise InvalidArgument(f"{name}: action must be a function action(change), got {action!r}.")
+        if action is not None:
+            demand_arguments(action, f"{name}: action", ("change",))
         found.append(Event(function, name, limit or math.inf, number(direction), action=action))
     return found
 

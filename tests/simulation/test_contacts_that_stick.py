@@ -1,0 +1,52 @@
+"""Contacts with friction at the bound of sticking: closed forms of what holds, and of how a slip begins."""
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+
+C = ts.constraints
+G = 9.81  # m/s^2
+
+
+@pytest.mark.parametrize("angle", [0.2, 0.4])
+@pytest.mark.parametrize("speed", [0.0, -1.0])
+def test_a_contact_that_slides_without_friction_sticks_up_to_its_static_bound(angle, speed):
+    """tan(0.2) = 0.203 is below it, tan(0.4) = 0.423 above."""
+    scene = ts.Scene(gravity=(G * np.sin(angle), 0, -G * np.cos(angle)))
+    block = scene.add_point_mass(2.0, velocity=(speed, 0, 0), name="block")
+    scene.add(C.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), unilateral=True, static=0.3, name="floor"))
+    solution = ts.simulate(scene, (0, 1))
+    a, holds = G * np.sin(angle), angle < 0.3
+    place = -(speed**2) / (2 * a) if holds else speed + a / 2
+    assert abs(solution.position("block")[-1, 0] - place) < 1e-14
+    assert solution.sticking("floor")[-1] == holds
+    np.testing.assert_allclose(solution.reaction("floor")[0][-1, 0], -2 * a if holds else 0.0, rtol=1e-14, atol=1e-14)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_point_rests_on_a_ball_and_in_a_bowl(inside):
+    scene, turn = ts.Scene(), np.pi if inside else 0.0
+    place = [np.sin(0.2 + turn), 0, np.cos(0.2 + turn)]
+    body = scene.add_body(2.0, (0.1, 0.1, 0.1), place, name="body")
+    scene.add(C.SphereContact(body, scene.ground, radius_a=0.0, radius_b=1.0, inside=inside, kinetic=0.5, name="rough"))
+    solution = ts.simulate(scene, (0, 0.1), t_eval=[0.0])
+    np.testing.assert_allclose(solution.friction_demand("rough"), np.tan(0.2), rtol=1e-14)
+    np.testing.assert_allclose(solution.contact_point("rough"), [place], rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.2])
+def test_a_light_box_slips_on_a_plate_that_shakes(mu):
+    """A w^2 = 5 m/s^2; with all four corners at their bounds, three of them alone find no reactions."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    plate = scene.add_body(5.0, (1, 1, 1), velocity=(0.5, 0, 0))
+    way = scene.add(C.Translational.at(scene.ground, plate, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(C.TranslationMotor.of(way, displacement=ts.motions.Sine(0.05, 10.0)))
+    box = scene.add_body(1.0, (0.01, 0.01, 0.01), (0, 0, 0.02), velocity=(0.5, 0, 0), name="box")
+    for corner in ((-0.3, -0.3, -0.02), (-0.3, 0.3, -0.02), (0.3, -0.3, -0.02), (0.3, 0.3, -0.02)):
+        scene.add(C.PlaneContact(box, plate, point_a=corner, normal_b=(0, 0, 1), unilateral=True, kinetic=mu))
+    solution = ts.simulate(scene, (0, 0.1), rtol=1e-12, atol=1e-12)
+    begin = np.arcsin(mu * G / 5.0) / 10.0
+    assert abs(solution.phases[0][1] - begin) < 1e-14
+    speed = 0.5 * np.cos(10.0 * begin) - mu * G * (0.1 - begin)
+    np.testing.assert_allclose(solution.velocity("box")[-1], [speed, 0, 0], rtol=1e-13, atol=1e-13)

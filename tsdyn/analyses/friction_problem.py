@@ -211,10 +211,11 @@ class Frictions:
         found = (sizes + np.sqrt(gained)) / USUAL
         return np.where(found > 0.0, found, 1.0)
 
-    def at(self, q, paces):
-        """The `FrictionFrames` at q (n,)."""
+    def at(self, q, paces, length):
+        """The `FrictionFrames` at q (n,); length: of the scene, m."""
         A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
-        return FrictionFrames(self, axes[0], A, paces)
+        still = LEVEL * (USUAL * paces) ** 2 / np.where(self.turns, 1.0, length or np.inf)
+        return FrictionFrames(self, axes[0], A, paces, still)
 
 
 def within(v, ways, signed):
@@ -232,11 +233,12 @@ def within(v, ways, signed):
 class FrictionFrames:
     """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3).
 
-    paces (units,): the lengths of directions that are written, over which friction keeps them below SLIP.
+    paces (units,): the lengths of directions that are written, over which friction keeps them below SLIP. still
+    (units,): accelerations of driven units that count as none.
     """
 
-    def __init__(self, frictions, axes, A, paces):
-        self.frictions, self.axes, self.A, self.paces = frictions, axes, A, paces
+    def __init__(self, frictions, axes, A, paces, still):
+        self.frictions, self.axes, self.A, self.paces, self.still = frictions, axes, A, paces, still
 
     def written(self, i, way):
         """The numbers of a direction (3,), ground frame: a sign where there is an axis."""
@@ -542,8 +544,9 @@ class RestProblem:
 
     def _found(self, ways, N, a, small, unloaded):
         sticking = [i for i in self.rows if i not in (*ways, *self.idle, *self.light)]
-        blocked = [i for i in ways if self._is_blocked(i, sticking, self.pressed)] + self.idle
         rates, (unloaded, limits) = self._rates(ways, a, small), unloaded
+        # What a motor moves is not held, though nothing else moves it
+        blocked = [i for i in ways if not rates[i] and self._is_blocked(i, sticking, self.pressed)] + self.idle
         for i in self.light:
             along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
             ways[i] = along @ self.bases[i] / np.linalg.norm(along)
@@ -600,7 +603,7 @@ class RestProblem:
                 bound += share * N[self.units[i].load.normal] if share else 0.0
                 if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
                     found[i] = x[at] @ basis / force
-                elif self.is_dead(i) and size > small[at].max():  # nothing holds it
+                elif self.is_dead(i) and size > max(small[at].max(), self.place.still[i]):  # nothing holds it
                     found[i] = a[at] @ basis / size
                 continue
             along = a[at] @ basis @ ways[i]
@@ -643,7 +646,7 @@ class RestProblem:
         return np.concatenate([*(self.at[i] for i in units), np.zeros(0, int)]).astype(int)
 
     def _idle(self, ways):
-        """Units that stick by what others hold: with rows of their own the reactions wouldn't be unique."""
+        """Units that stick by what others hold, or a motor: with rows of their own the reactions wouldn't be unique."""
         free = [i for i in self.rows if i not in ways and i not in self.light]
         own, sticking, idle = self._held(free), [], []
         try:  # by the pivots: what is left of each row beside those before
@@ -654,7 +657,7 @@ class RestProblem:
             pass
         for i in free:
             pressed = self.pressed[:0] if i in self.engaged else self.pressed
-            blocked = (sticking or pressed.size) and self._is_blocked(i, sticking, pressed)
+            blocked = self.is_dead(i) or ((sticking or pressed.size) and self._is_blocked(i, sticking, pressed))
             (idle if blocked else sticking).append(i)
         return idle
 

@@ -134,13 +134,16 @@ class Slowing:
     """The velocities of frictions, along the directions in which they slide, as event functions.
 
     In a plane a new direction is taken where it has turned by 60 degrees: `friction_problem.within`. The velocity of
-    one that has just begun to slide is divided by the time since.
+    one that has just begun to slide is divided by the time since. Of one that is held without a force, what its
+    velocity lacks of one that counts: a motor may begin to move it.
 
     Parameters
     ----------
     frictions : Frictions
     begun : dict
         Of those that have just begun to slide: time and acceleration there, by their numbers.
+    starting : dict
+        Of those that are held without a force: the velocity that counts, by their numbers.
     rates : ndarray (frictions,)
         Sizes of the terms of accelerations.
 
@@ -150,8 +153,9 @@ class Slowing:
         Rounding of the values, of slides that begin with an acceleration that is hardly more.
     """
 
-    def __init__(self, frictions, begun, rates):
-        self.frictions, self.begun, self.noise = frictions, begun, np.zeros(frictions.count)
+    def __init__(self, frictions, begun, starting, rates):
+        self.frictions, self.begun, self.starting = frictions, begun, starting
+        self.noise = np.zeros(frictions.count)
         for i, (_, first) in begun.items():
             self.noise[i] = LEVEL * rates[i] if first < LEVEL / REACTION_NOISE * rates[i] else 0.0
 
@@ -161,4 +165,8 @@ class Slowing:
         for i, (begun, first) in self.begun.items():
             later = states.t > begun
             values[:, i] = np.where(later, values[:, i] / np.where(later, states.t - begun, 1.0), first)
+        if self.starting:
+            v, _, _ = self.frictions.motions(states.q, states.qd)
+            for i, counts in self.starting.items():
+                values[:, i] = counts - np.linalg.norm(v[:, i], axis=1)
         return values

@@ -632,6 +632,27 @@ class RestProblem:
         """The largest velocity or rate of some units."""
         return np.abs(self.J[self._held(units)] @ qd).max(initial=0.0)
 
+    def stopping_time(self, units, qd):
+        """Time, s, in which slips in a plane that are ended would end by themselves.
+
+        Friction f against v, and g from all else: d(f |v| + g.v)/dt = |g|^2 - f^2, however v turns.
+        """
+        slips = {i: self.J[self.at[i]] @ qd for i in units if not self.place.frictions.signed[i]}
+        slips = {i: (v, v / np.linalg.norm(v)) for i, v in slips.items() if v.any()}
+        if not slips or self.cones is not None:
+            return 0.0
+        try:
+            x, N = self.solve({i: e @ self.bases[i] for i, (_, e) in slips.items()})
+        except NoRest:
+            return 0.0
+        a, left, falls = self.c + self.G @ x + self.D @ N, 0.0, 0.0
+        for i, (v, e) in slips.items():  # of slips that end together: the sums
+            at = self.at[i]
+            f = -e @ self.G[np.ix_(at, at)] @ x[at]
+            g = a[at] + f * e
+            left, falls = left + f * (v @ e) + g @ v, falls + f * f - g @ g
+        return float(left / falls) if falls > 0.0 else 0.0
+
     def stopped(self, units, qd):
         """Velocities (n,) with the slips ended of units that stick, by the least change of kinetic energy."""
         rows = self._held(units)

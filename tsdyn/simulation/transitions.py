@@ -350,6 +350,8 @@ class Transitions:
         ends = [i for i in rest.sticking if i in fresh and not self.frictions.signed[i]]
         if problem.slip([i for i in rest.sticking if i in fresh], self.qd) > 0.5 * self.options.initial_tol:
             ends = rest.sticking
+        if self._is_unstruck():
+            self.rest = max(self.rest, self.t + problem.stopping_time(ends, self.qd))
         self.qd = problem.stopped(ends, self.qd)
         return rest, ranks, phase.packed
 

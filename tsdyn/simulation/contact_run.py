@@ -475,8 +475,12 @@ class _ContactRun(Transitions, Checkpoints):
         light = [i for i in modes.limits if i not in modes.sticking]
         loaded, units = [*sticking, *light], [[frictions.units[i] for i in some] for some in (sticking, light)]
         breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in loaded])).over
-        _, rates, paces = self._slip_terms_of_frictions()
-        starting = {i: 2.0 * STOPPED * paces[i] for i in self._idle_frictions()}
+        starting, idle = {}, self._idle_frictions()
+        if idle:
+            _, rates, paces = self._slip_terms_of_frictions()
+            starting = {i: 2.0 * STOPPED * paces[i] for i in idle}
+        else:
+            rates = frictions.sizes(self.q, self.qdd, self.length)
         slowing = Slowing(frictions, modes.begun, starting, rates).over
         for i in range(frictions.count):
             if i in modes.blocked and i not in starting:

@@ -7,7 +7,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import CLOSE, TIGHT
-from tests.simulation.test_contact_units import Units
+from tests.helpers.units import Units
 
 C, F = ts.constraints, ts.forces
 G = 9.81

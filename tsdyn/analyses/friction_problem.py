@@ -24,6 +24,7 @@ from ..maths.complementarity import OPEN, STICKS
 from ..maths.dense_linalg import range_and_null_space
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
+from ..model.packed import reach_of
 from ..observables.evaluate import ITERATIONS, constraint_arrays
 from ..observables.generalised_forces import applied_loads
 from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities
@@ -122,7 +123,7 @@ class Frictions:
     """
 
     def __init__(self, scene, acting=None):
-        self.packed, self.units = scene.packed, []
+        self.packed, self.units, self.reach = scene.packed, [], reach_of(scene.packed)
         known = {id(load.force): load for load in (self.packed.loads if acting is None else acting)}
         for force, load in zip(scene._forces, self.packed.loads, strict=True):
             load, slot = known.get(id(force), load._replace(normal=-1)), load.slot + force.memory
@@ -170,13 +171,14 @@ class Frictions:
     def sizes(self, q, qd, length):
         """What rounding of velocities at q, qd (n,) is a share of (units,): sizes of their terms.
 
-        Joints couple rates of turning to the velocities of their bodies: these count, over the scene's length, m.
+        Joints couple rates of turning to the velocities of their bodies: these count, over the largest lever, or where
+        there is none over the scene's length, m.
         """
         if not self.count:
             return np.zeros(0)
         sizes, r = self.motions(q[None], qd[None])[1][0], self.packed.system.bodies[:, :1] + np.arange(3)
         passing = np.append(np.linalg.norm(qd[r], axis=1), 0.0)[self.ends].sum(axis=1)
-        return sizes + np.where(self.turns, passing, 0.0) / (length or np.inf)
+        return sizes + np.where(self.turns, passing, 0.0) / (self.reach or length or np.inf)
 
     def speeds(self, q, qd, memory):
         """Of those that slide (k, units): velocities along their directions, in a plane as of `within`."""

@@ -372,3 +372,19 @@ def test_a_slide_that_begins_across_its_load_keeps_the_quick_method(kind):
     solution = ts.simulate(scene, (0.0, 5.0), rtol=1e-12, atol=1e-12, max_steps=1000)
     # dx/dt = v by scipy's DOP853 at 1e-13, from the series at 1e-5 s
     np.testing.assert_allclose(solution.position("block")[-1], [-0.5518621, -0.13589615, 0.0], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["plane", "given"])
+def test_a_slip_that_turns_down_the_slope_rests_in_time(kind):
+    """Thrown across a slope: d(f |v| + g.v)/dt = |g|^2 - f^2, so it rests after v f / (f^2 - |g|^2)."""
+    slope, mu = 0.3, 0.35
+    along, f = G * np.sin(slope), mu * G * np.cos(slope)
+    scene = ts.Scene(gravity=(along, 0, -G * np.cos(slope)))
+    block = scene.add_point_mass(1.0, position=(2, 0, 0), velocity=(0, 1, 0))
+    plane = scene.add(C.PlaneContact(block, scene.ground, normal_b=(0, 0, 1)))
+    if kind == "plane":
+        scene.add(F.ContactFriction(plane, kinetic=mu, name="friction"))
+    else:
+        scene.add(F.CoulombFriction(block, scene.ground, force=f, name="friction"))
+    solution = ts.simulate(scene, (0.0, 2.0), rtol=1e-13, atol=1e-13)
+    assert solution.phases[-1] == (pytest.approx(f / (f**2 - along**2), abs=CLOSE), 2.0, ("friction",))

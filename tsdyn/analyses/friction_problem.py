@@ -25,6 +25,7 @@ from ..maths.dense_linalg import range_and_null_space
 from ..maths.dense_solve import least_squares, product
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
+from ..model.packed import reach_of
 from ..observables.evaluate import ITERATIONS, constraint_arrays
 from ..observables.generalised_forces import applied_loads
 from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities
@@ -123,7 +124,7 @@ class Frictions:
     """
 
     def __init__(self, scene, acting=None):
-        self.packed, self.units = scene.packed, []
+        self.packed, self.units, self.reach = scene.packed, [], reach_of(scene.packed)
         known = {id(load.force): load for load in (self.packed.loads if acting is None else acting)}
         for force, load in zip(scene._forces, self.packed.loads, strict=True):
             load, slot = known.get(id(force), load._replace(normal=-1)), load.slot + force.memory
@@ -171,13 +172,14 @@ class Frictions:
     def sizes(self, q, qd, length):
         """What rounding of velocities at q, qd (n,) is a share of (units,): sizes of their terms.
 
-        Joints couple rates of turning to the velocities of their bodies: these count, over the scene's length, m.
+        Joints couple rates of turning to the velocities of their bodies: these count, over the largest lever, or where
+        there is none over the scene's length, m.
         """
         if not self.count:
             return np.zeros(0)
         sizes, r = self.motions(q[None], qd[None])[1][0], self.packed.system.bodies[:, :1] + np.arange(3)
         passing = np.append(np.linalg.norm(qd[r], axis=1), 0.0)[self.ends].sum(axis=1)
-        return sizes + np.where(self.turns, passing, 0.0) / (length or np.inf)
+        return sizes + np.where(self.turns, passing, 0.0) / (self.reach or length or np.inf)
 
     def turn(self, t, levels, memory):
         """Write the directions of slip into memory (k, slots), zero where a slip rate is zero to rounding.
@@ -204,10 +206,11 @@ class Frictions:
         found = (sizes + np.sqrt(gained)) / USUAL
         return np.where(found > 0.0, found, 1.0)
 
-    def at(self, q, paces):
-        """The `FrictionFrames` at q (n,)."""
+    def at(self, q, paces, length):
+        """The `FrictionFrames` at q (n,); length: of the scene, m."""
         A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
-        return FrictionFrames(self, axes[0], A, paces)
+        still = LEVEL * (USUAL * paces) ** 2 / np.where(self.turns, 1.0, length or np.inf)
+        return FrictionFrames(self, axes[0], A, paces, still)
 
 
 def within(v, ways, signed):
@@ -225,11 +228,12 @@ def within(v, ways, signed):
 class FrictionFrames:
     """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3).
 
-    paces (units,): the lengths of directions that are written, over which friction keeps them below SLIP.
+    paces (units,): the lengths of directions that are written, over which friction keeps them below SLIP. still
+    (units,): accelerations of driven units that count as none.
     """
 
-    def __init__(self, frictions, axes, A, paces):
-        self.frictions, self.axes, self.A, self.paces = frictions, axes, A, paces
+    def __init__(self, frictions, axes, A, paces, still):
+        self.frictions, self.axes, self.A, self.paces, self.still = frictions, axes, A, paces, still
 
     def written(self, i, way):
         """The numbers of a direction (3,), ground frame: a sign where there is an axis."""
@@ -535,8 +539,9 @@ class RestProblem:
 
     def _found(self, ways, N, a, small, unloaded):
         sticking = [i for i in self.rows if i not in (*ways, *self.idle, *self.light)]
-        blocked = [i for i in ways if self._is_blocked(i, sticking, self.pressed)] + self.idle
         rates, (unloaded, limits) = self._rates(ways, a, small), unloaded
+        # What a motor moves is not held, though nothing else moves it
+        blocked = [i for i in ways if not rates[i] and self._is_blocked(i, sticking, self.pressed)] + self.idle
         for i in self.light:
             along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
             ways[i] = along @ self.bases[i] / np.linalg.norm(along)
@@ -593,7 +598,7 @@ class RestProblem:
                 bound += share * N[self.units[i].load.normal] if share else 0.0
                 if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
                     found[i] = x[at] @ basis / force
-                elif self.is_dead(i) and size > small[at].max():  # nothing holds it
+                elif self.is_dead(i) and size > max(small[at].max(), self.place.still[i]):  # nothing holds it
                     found[i] = a[at] @ basis / size
                 continue
             along = a[at] @ basis @ ways[i]
@@ -622,6 +627,27 @@ class RestProblem:
         """The largest velocity or rate of some units."""
         return np.abs(self.J[self._held(units)] @ qd).max(initial=0.0)
 
+    def stopping_time(self, units, qd):
+        """Time, s, in which slips in a plane that are ended would end by themselves.
+
+        Friction f against v, and g from all else: d(f |v| + g.v)/dt = |g|^2 - f^2, however v turns.
+        """
+        slips = {i: self.J[self.at[i]] @ qd for i in units if not self.place.frictions.signed[i]}
+        slips = {i: (v, v / np.linalg.norm(v)) for i, v in slips.items() if v.any()}
+        if not slips or self.cones is not None:
+            return 0.0
+        try:
+            x, N = self.solve({i: e @ self.bases[i] for i, (_, e) in slips.items()})
+        except NoRest:
+            return 0.0
+        a, left, falls = self.c + self.G @ x + self.D @ N, 0.0, 0.0
+        for i, (v, e) in slips.items():  # of slips that end together: the sums
+            at = self.at[i]
+            f = -e @ self.G[np.ix_(at, at)] @ x[at]
+            g = a[at] + f * e
+            left, falls = left + f * (v @ e) + g @ v, falls + f * f - g @ g
+        return float(left / falls) if falls > 0.0 else 0.0
+
     def stopped(self, units, qd):
         """Velocities (n,) with the slips ended of units that stick, by the least change of kinetic energy."""
         rows = self._held(units)
@@ -636,7 +662,7 @@ class RestProblem:
         return np.concatenate([*(self.at[i] for i in units), np.zeros(0, int)]).astype(int)
 
     def _idle(self, ways):
-        """Units that stick by what others hold: with rows of their own the reactions wouldn't be unique."""
+        """Units that stick by what others hold, or a motor: with rows of their own the reactions wouldn't be unique."""
         free = [i for i in self.rows if i not in ways and i not in self.light]
         own, sticking, idle = self._held(free), [], []
         try:  # by the pivots: what is left of each row beside those before
@@ -647,7 +673,7 @@ class RestProblem:
             pass
         for i in free:
             pressed = self.pressed[:0] if i in self.engaged else self.pressed
-            blocked = (sticking or pressed.size) and self._is_blocked(i, sticking, pressed)
+            blocked = self.is_dead(i) or ((sticking or pressed.size) and self._is_blocked(i, sticking, pressed))
             (idle if blocked else sticking).append(i)
         return idle
 

@@ -23,8 +23,8 @@ FORCE_QUOTIENT = 7e-4
 
 # Series of forces against their laws (loops/law_check.py). OFF: what sharp ones may be off by, as a velocity over the
 # tolerance of a step. OFF_SELDOM: the same of laws that are analytic but at few places; flights past the anchor of a
-# spring are off by twice the tolerance at most at 200, as at 20, and by forty times at 1000. LAW_TOLERANCE: the least
-# velocity, m/s or rad/s, below which terms that cancel within a law count.
+# spring are off by twice the tolerance at most at 200, as at 20, and by forty times at 1000. LAW_TOLERANCE: as a share
+# of the velocity of its point, below which terms that cancel within a law count.
 OFF, OFF_SELDOM, LAW_TOLERANCE = 2000.0, 200.0, 1e-12
 
 # m/s and rad/s: velocity of the exact law below which the direction of sliding is kept; way and time of a stop from

@@ -13,6 +13,7 @@ from ..ahead import compile_ahead
 from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
 from ..analyses.friction_problem import Frictions, Hold, hold_of, immobile
+from ..analyses.tolerances import STOPPED
 from ..configuration.initial_conditions import DependentRows
 from ..elements.unilateral import contacts_of
 from ..errors import (
@@ -443,13 +444,15 @@ class _ContactRun(Transitions, Checkpoints):
     def _names(self):
         """Names of the units whose rows hold; those of contacts that stick stand there twice."""
         held = sorted([*self.modes.closed, *self.modes.idle])
-        memory, units = self.remembered[self.count :], self.frictions.units
-        off = {*self.off}
-        idle = [i for i in self.modes.blocked if i not in off and not memory[units[i].way].any()]
         closed = [self.gaps.names[i] for i in held]
         sticking = [self.gaps.names[i] for i in held if self.modes.sticks(i)]
-        sticking += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
+        sticking += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *self._idle_frictions()])]
         return *dict.fromkeys(closed), *dict.fromkeys(sticking)
+
+    def _idle_frictions(self):
+        """Frictions that others hold, or a motor, without a force."""
+        memory, units, off = self.remembered[self.count :], self.frictions.units, {*self.off}
+        return [i for i in self.modes.blocked if i not in off and not memory[units[i].way].any()]
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
@@ -483,9 +486,15 @@ class _ContactRun(Transitions, Checkpoints):
         light = [i for i in modes.limits if i not in modes.sticking]
         loaded, units = [*sticking, *light], [[frictions.units[i] for i in some] for some in (sticking, light)]
         breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in loaded])).over
-        slowing = Slowing(frictions, modes.begun, frictions.sizes(self.q, self.qdd, self.length)).over
+        starting, idle = {}, self._idle_frictions()
+        if idle:
+            _, rates, paces = self._slip_terms_of_frictions()
+            starting = {i: 2.0 * STOPPED * paces[i] for i in idle}
+        else:
+            rates = frictions.sizes(self.q, self.qdd, self.length)
+        slowing = Slowing(frictions, modes.begun, starting, rates).over
         for i in range(frictions.count):
-            if i in modes.blocked:
+            if i in modes.blocked and i not in starting:
                 continue
             function = GroupMember(breaking, loaded.index(i)) if i in loaded else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)

@@ -271,9 +271,8 @@ class Transitions:
         v, _, _ = frictions.motions(self.q[None], self.qd[None])
         # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
         # once: where loads vanish along a chain events would follow each other ever faster
-        sizes, rates = (frictions.sizes(self.q, each, self.length) for each in (self.qd, self.qdd))
-        paces = frictions.paces(sizes, rates, np.linalg.norm(self.scene.system.gravity), self.length)
-        place = frictions.at(self.q, paces)
+        sizes, rates, paces = self._slip_terms_of_frictions()
+        place = frictions.at(self.q, paces, self.length)
         least = np.maximum(NEGLIGIBLE * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
         least = np.maximum(least, EVENT_ERROR * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
@@ -284,9 +283,11 @@ class Transitions:
             if i in self.off:
                 continue
             speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
-            if i in before.blocked and memory[unit.way].any():
+            slides = memory[unit.way].any()
+            if i in before.blocked and slides:
                 guess[i] = place.read(i, memory)
-            if speed <= max(least[i], 0.0 if signed else STOPPED * paces[i]) or (signed and i in fired):
+            stops = signed and i in fired and (slides or i not in before.blocked)  # a motor may begin to move others
+            if speed <= max(least[i], 0.0 if signed else STOPPED * paces[i]) or stops:
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:
@@ -307,6 +308,11 @@ class Transitions:
         if cones is not None:
             self.friction = self._load(packed, rest.loads)
         return None
+
+    def _slip_terms_of_frictions(self):
+        """Terms of the slips of frictions, those of their accelerations before, and their `paces`, (units,) each."""
+        sizes, rates = (self.frictions.sizes(self.q, each, self.length) for each in (self.qd, self.qdd))
+        return sizes, rates, self.frictions.paces(sizes, rates, np.linalg.norm(self.scene.system.gravity), self.length)
 
     def _load(self, packed, N):
         """What frictions exert (n,) that slide, by their normal loads (frictions,)."""
@@ -345,6 +351,8 @@ class Transitions:
         ends = [i for i in rest.sticking if i in fresh and not self.frictions.signed[i]]
         if problem.slip([i for i in rest.sticking if i in fresh], self.qd) > 0.5 * self.options.initial_tol:
             ends = rest.sticking
+        if self._is_unstruck():
+            self.rest = max(self.rest, self.t + problem.stopping_time(ends, self.qd))
         self.qd = problem.stopped(ends, self.qd)
         return rest, ranks, phase.packed
 

@@ -170,11 +170,11 @@ class SlowingParts(NamedTuple):
     axes: np.ndarray
     ways: np.ndarray  # int64 (3 units,)  where the memory has directions
     signed: np.ndarray  # int64 (units,)  1 of those along an axis, whose direction is a sign
-    begun: np.ndarray  # (2, units)  time and acceleration of those that have just begun to slide
+    begun: np.ndarray  # (3, units)  time and acceleration of those that have just begun to slide; as of `starting`
     sizes: np.ndarray  # (2,)  numbers of coordinates and units
 
 
-load_slowing = loader(SlowingParts(_none, _whole, _none, _none, _whole, _whole, np.zeros((2, 0)), _whole))
+load_slowing = loader(SlowingParts(_none, _whole, _none, _none, _whole, _whole, np.zeros((3, 0)), _whole))
 
 
 @callback(VALUES)
@@ -197,9 +197,11 @@ def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
                 across = v[i] - along * x.memory[x.ways[o + i]] / size
                 square += across * across
             values[u] = along - math.sqrt(square / 3.0)
-        begun, first = x.begun[0, u], x.begun[1, u]
+        begun, first, counts = x.begun[0, u], x.begun[1, u], x.begun[2, u]
         if begun < math.inf:
             values[u] = values[u] / (t - begun) if t > begun else first
+        if counts < math.inf:
+            values[u] = counts - math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     return 0
 
 
@@ -207,13 +209,16 @@ class Slowing(KernelFunctions):
     """The velocities of frictions, along the directions in which they slide, as event functions.
 
     In a plane a new direction is taken where it has turned by 60 degrees: `friction_problem.within`. The velocity of
-    one that has just begun to slide is divided by the time since.
+    one that has just begun to slide is divided by the time since. Of one that is held without a force, what its
+    velocity lacks of one that counts: a motor may begin to move it.
 
     Parameters
     ----------
     frictions : Frictions
     begun : dict
         Of those that have just begun to slide: time and acceleration there, by their numbers.
+    starting : dict
+        Of those that are held without a force: the velocity that counts, by their numbers.
     rates : ndarray (frictions,)
         Sizes of the terms of accelerations.
 
@@ -223,12 +228,13 @@ class Slowing(KernelFunctions):
         Rounding of the values, of slides that begin with an acceleration that is hardly more.
     """
 
-    def __init__(self, frictions, begun, rates):
+    def __init__(self, frictions, begun, starting, rates):
         count, packed = frictions.count, frictions.packed
-        self.noise, starts = np.zeros(count), np.tile([[np.inf], [0.0]], count)
+        self.noise, starts = np.zeros(count), np.tile([[np.inf], [0.0], [np.inf]], count)
         for i, (t, first) in begun.items():
             self.noise[i] = LEVEL * rates[i] if first < LEVEL / REACTION_NOISE * rates[i] else 0.0
-            starts[:, i] = t, first
+            starts[:2, i] = t, first
+        starts[2, list(starting)] = list(starting.values())
         memory, sizes = np.zeros(packed.system.memory.size), np.array([packed.system.bodies[:, 1].sum(), count], int)
         ways, signed = np.ascontiguousarray(frictions.ways).ravel(), frictions.signed.astype(int)
         own, *self._keep = resident(

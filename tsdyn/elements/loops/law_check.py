@@ -18,7 +18,7 @@ none of them vanishes within the step, and nothing else is evaluated. Past a zer
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
 from ...jit.simd import first, fma, four, get, let, put, second, splat, third, times
-from ...maths.tolerances import PIVOT_ROUNDING
+from ...maths.tolerances import PIVOT_ROUNDING, TINY
 from ...motions.tracing import LENGTH as PROGRAM_LENGTH
 from ...motions.tracing import T
 from ..markers import PARAMETERS, POINT, TURN
@@ -78,7 +78,7 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
         speed = max(speed, abs(xd[c + i]))
     # Within tolerance as a velocity over the step
     tol = limits[ATOL] + limits[RTOL] * speed
-    limits[EXCESS] = weight * off * limits[LENGTH] / max(limits[MOST] * tol, LAW_TOLERANCE)
+    limits[EXCESS] = weight * off * limits[LENGTH] / max(limits[MOST] * tol, LAW_TOLERANCE * speed, TINY)
     if limits[EXCESS] <= 1.0:
         return False
     # or within rounding of the terms of the series

@@ -351,7 +351,7 @@ def _is_off(s, h, row, known, weight, speed, limits):  # seven: series, law, pla
     for i in range(3):
         total, terms = _summed(s, row + i, known, limits[TAU])
         off = abs(total - h[row + i, 0])
-        small = weight * off * limits[LENGTH_OF_STEP] <= max(limits[MOST] * tol, LAW_TOLERANCE)
+        small = weight * off * limits[LENGTH_OF_STEP] <= max(limits[MOST] * tol, LAW_TOLERANCE * speed)
         if not small and not off <= max(PIVOT_ROUNDING, limits[ATOL] + limits[RTOL]) * terms:
             return True
     return False

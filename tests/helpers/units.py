@@ -1,0 +1,23 @@
+"""Scenes in other units of length, mass and time."""
+
+from typing import NamedTuple
+
+import tsdyn as ts
+
+C = ts.constraints
+
+
+class Units(NamedTuple):
+    """Units in terms of SI."""
+
+    length: float = 1.0
+    mass: float = 1.0
+    time: float = 1.0
+
+    def scene(self):
+        return ts.Scene(gravity=(0, 0, -9.81 * self.length / self.time**2))
+
+    def floor(self, body, point, base=None, at=(0, 0, 0), **law):
+        base = body.scene.ground if base is None else base
+        at = {"point_a": point, "point_b": at, "normal_b": (0, 0, 1), "unilateral": True}
+        body.scene.add(C.PlaneContact(body, base, **at, **law))

@@ -1,4 +1,4 @@
-"""Contacts with friction that brace each other: reactions that aren't unique, redundant rows, and none without a load."""
+"""Contacts with friction that brace each other: reactions that are not unique, redundant rows, none without a load."""
 
 import numpy as np
 import pytest

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tsdyn.stress import judgement, laws
-from tsdyn.stress.random_scenes import DrawnCase
+from tsdyn.stress.random_scenes import CONTACTS, DrawnCase, drawn
 
 C = ts.constraints
 
@@ -137,6 +137,56 @@ def test_faults_of_contacts_are_found():
     solution.qd[after, 2] *= 2.1  # more than it came with
     del solution.kinetic_energy
     assert laws.energy_left(solution)[0] > 1e-2 * size
+
+
+def sliding():
+    """A box that slides and turns on the floor, after a fall."""
+    scene = ts.Scene()
+    box = scene.add_body(**ts.shapes.box((0.4, 0.3, 0.2), mass=2.0), position=(0, 0, 0.1), velocity=(1, 0.5, 0))
+    box.angular_velocity = (0, 0, 2)
+    for i, (x, y) in enumerate(((-0.2, -0.15), (0.2, -0.15), (0, 0.15))):
+        law = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.2}
+        scene.add(C.PlaneContact(box, scene.ground, point_a=(x, y, -0.1), **law, name=f"{i}"))
+    return scene
+
+
+def test_friction_that_is_off_is_found():
+    """Outside its cone, where it sticks; along the slip, where it slides."""
+    solution = ts.simulate(sliding(), (0.0, 1.0), dense_output=True).raise_if_failed()
+    assert {found.law for found in laws.rubbing(solution)} == {"friction in its cone", "friction against the slip"}
+    assert not broken(solution)
+    assert solution.sticking("0")[-1]
+    solution.multipliers[-1, 1] = 0.21 * solution.multipliers[-1, 0]
+    assert "friction in its cone" in broken(solution)
+    solution = ts.simulate(sliding(), (0.0, 1.0), dense_output=True)
+    solution.multipliers[0, 1:3] *= -1.0
+    assert "friction against the slip" in broken(solution)
+
+
+def test_phases_that_overlap_are_found():
+    solution = bounced()
+    assert not any(found.broken for found in laws.phases(solution))
+    begin, _, names = solution._phases.list[0]
+    solution._phases.list[0] = begin, begin + 1e-9, names
+    assert "phases in a row" in broken(solution)
+
+
+def test_a_motion_that_the_mirror_changes_is_found():
+    """Of a box that slides, a chain of hinges with stops, and ropes; then with a gravity that the image has alone."""
+    seeds = ("stops", 5000003), ("ropes", 5000003), ("cradle", 5000001)
+    cases = [drawn(np.random.default_rng(seed), 2, 3, {kind: CONTACTS[kind]}) for kind, seed in seeds]
+    for case in [DrawnCase("sliding", sliding(), (0.0, 1.0), {"rtol": 1e-8, "atol": 1e-8}), *cases]:
+        found = judgement.mirrored(case, judgement.run_case(case), judgement.run_case)
+        assert [each.law for each in found] == ["motion of the mirrored scene"]
+        assert not found[0].broken
+
+    def tilted(case, **options):
+        if case.scene is not cases[0].scene:
+            case = case._replace(scene=case.scene.with_parameters({"gravity": (0.01, 0, -9.81)}))
+        return judgement.run_case(case, **options)
+
+    [found] = judgement.mirrored(cases[0], judgement.run_case(cases[0]), tilted)
+    assert found.broken
 
 
 def test_reactions_of_rounding_do_not_pull():

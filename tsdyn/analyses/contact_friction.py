@@ -194,13 +194,13 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     closed = [i for i in inertia.held if i in resting]
 
     def ended(which, closed=closed):
-        found = halted(inertia, qd, closed, which)
+        found, work = halted(inertia, qd, closed, which)
         if found is not qd:
             rates, before = inertia.rates(found), inertia.rates(qd)
             more = [i for i in opening if rates[i] <= 0.5 * before[i]]
             if rates[resting].any() or more:  # others have closed at once
-                found = halted(inertia, qd, [*resting, *more], which)
-            if _gains(inertia, qd, found):  # by the friction of others that slide
+                found, work = halted(inertia, qd, [*resting, *more], which)
+            if work > NEGLIGIBLE * _energy(inertia, qd):  # by the friction of others that slide
                 found = qd
         return found, solve_rough_contacts(inertia, resting, found, fired)
 
@@ -218,10 +218,9 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     return ended(which) if which else found
 
 
-def _gains(inertia, before, after):
-    """Whether velocities (n,) have more kinetic energy afterwards, beyond rounding."""
-    gain, q = inertia.gaps.workspace.gain, inertia.q
-    return gain(q, before, after) > NEGLIGIBLE * gain(q, np.zeros_like(before), before)
+def _energy(inertia, qd):
+    """Kinetic energy, J, of velocities (n,)."""
+    return inertia.gaps.workspace.gain(inertia.q, np.zeros_like(qd), qd)
 
 
 def _pair(gaps, i):
@@ -380,12 +379,13 @@ def _basis(inertia, which, columns, load, fired):
 
 
 def halted(inertia, qd, resting, which):
-    """Velocities (n,) with the slips ended of the gaps `which`, while the gaps `resting` keep their rates.
+    """Velocities (n,) with the slips ended of the gaps `which`, while the gaps `resting` keep their rates; and work, J.
 
-    What sticks goes on to, and what goes on sliding changes its friction with its load: as in the course of time.
+    What sticks goes on to, and what goes on sliding changes its friction with its load: as in the course of time. The
+    work is that of the friction: what drives bodies does some, too, where they come to rest on one that moves.
     """
     if not which:
-        return qd
+        return qd, 0.0
     frictional, slips = [i for i in resting if inertia.gaps.rough[i]], inertia.slips(qd)
     moving = [i for i in frictional if i not in which and slips[i].any()]
     loads = _loads(inertia, resting, {i: slips[i] / np.hypot(*slips[i]) for i in moving})
@@ -394,7 +394,10 @@ def halted(inertia, qd, resting, which):
     response = inertia.free(np.concatenate([loads, tangents]).T)
     left = np.concatenate([np.zeros(len(resting)), tangents @ qd])
     G = product(np.concatenate([inertia.J[resting], tangents]), response)
-    return qd - response @ least_squares(G, left, RANK_TOL**2)
+    p = least_squares(G, left, RANK_TOL**2)
+    after = qd - response @ p
+    friction = np.concatenate([loads - inertia.J[resting], tangents])
+    return after, -0.5 * float(p @ (friction @ (qd + after)))
 
 
 def slow_speeds(inertia, qd, terms):

@@ -1,4 +1,7 @@
-"""Random scenes with contacts, stops and ropes that go slack: stacks, cradles, chains over a floor, pins with play."""
+"""Random scenes with contacts, stops and ropes that go slack: stacks, cradles, chains over a floor, pins with play.
+
+Some beside friction of joints, or on bodies that are driven.
+"""
 
 from itertools import pairwise
 
@@ -6,7 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .. import constraints as joints
-from ..shapes import box
+from .. import forces
+from ..motions import Sine
+from ..shapes import box, sphere
 
 UP = (0.0, 0.0, 1.0)
 RESTITUTIONS, FRICTIONS = (0.0, 0.0, 0.3, 0.8, 1.0), (0.0, 0.0, 0.2, 0.6)
@@ -165,4 +170,88 @@ def play(d, n):
         last, place = body, place + np.array((1.0, 0.0, 0.0))
 
 
+# Those that were added later.
+
+
+def _rubs(d):
+    """Coefficients of friction; that of sticking is larger in half of the scenes."""
+    kinetic = float(d.rng.choice(FRICTIONS[2:]))
+    return {"kinetic": kinetic} | ({"static": 1.3 * kinetic} if d.rng.random() < 0.5 else {})
+
+
+def bowl(d, n):
+    """Balls that roll and slip in a large ball that is held or hangs, and on each other."""
+    e, rubs, found = _upright(d), _rubs(d), []
+    shell = d.scene.ground
+    if d.rng.random() < 0.3:
+        shell = d.body(np.zeros(3), rigid=True, mass=5.0)
+        d.scene.add(joints.Spherical.at(d.scene.ground, shell, point=d.place((0.0, 0.0, 1.5))))
+    for i in range(min(n, 4)):
+        radius = 0.1 * d.length
+        ball = d.scene.add_body(**sphere(radius, mass=d.mass * d.rng.uniform(0.3, 3.0)))
+        ball.position = d.place((0.25 * (i - 1.5), *(0.1 * d.rng.uniform(-1.0, 1.0, 2))))
+        ball.velocity, ball.angular_velocity = _thrown(d, 0.5)
+        inner = {"radius_a": radius, "radius_b": d.length, "inside": True}
+        d.scene.add(joints.SphereContact(ball, shell, **inner, **_law(d, e), **rubs))
+        for other in found:
+            d.scene.add(joints.SphereContact(ball, other, radius_a=radius, radius_b=radius, **_law(d, e), **rubs))
+        found.append(ball)
+
+
+def coins(d, n):
+    """Discs and balls that roll, slip, and jump on a floor."""
+    e, rubs, radius = _upright(d), _rubs(d), 0.3 * d.length
+    for i in range(min(n, 4)):
+        is_disc, axis = d.rng.random() < 0.6, d.unit()
+        reach = np.linalg.norm(axis[:2]) if is_disc else 1.0
+        center = np.array((0.7 * i, 0.0, 0.3 * reach + d.rng.choice((0.0, 0.2))))
+        body = d.body(center, rigid=True)
+        body.velocity, body.angular_velocity = _thrown(d, 0.8)
+        if not reach * radius < body.position[2]:  # it touches
+            body.velocity = body.velocity * (1.0, 1.0, 0.0)
+        given = {"center": body.position, "point": (0.0, 0.0, 0.0), "normal": UP, "radius": radius}
+        if is_disc:
+            d.scene.add(joints.RollingDisc.at(body, d.scene.ground, axis=axis, **given, **_law(d, e), **rubs))
+        else:
+            d.scene.add(joints.RollingBall.at(body, d.scene.ground, **given, **_law(d, e), **rubs))
+
+
+def shaken(d, n):
+    """A table that is shaken, and boxes on it."""
+    e, rubs, L = _upright(d), _rubs(d), d.length
+    table = d.body(np.zeros(3), rigid=True, mass=5.0)
+    table.orientation = (1.0, 0.0, 0.0, 0.0)
+    way, rate = d.rng.choice(((1.0, 0.0, 0.0), UP, (0.6, 0.0, 0.8))), d.rng.uniform(3.0, 20.0) / d.time
+    size = d.rng.uniform(0.2, 1.5) * 9.81 * L / (d.time * rate) ** 2
+    slide = d.scene.add(joints.Translational.at(d.scene.ground, table, point=table.position, axis=way))
+    d.scene.add(joints.TranslationMotor.of(slide, displacement=Sine(size, rate)))
+    for i in range(min(n, 2)):
+        box_ = d.scene.add_body(**box(L * np.array((0.4, 0.3, 0.2)), mass=d.mass * d.rng.uniform(0.5, 3.0)))
+        box_.position = L * np.array((0.6 * i, 0.0, 0.1))
+        box_.velocity = size * rate * np.array(way)
+        for x in (-0.2, 0.2):
+            for y in (-0.15, 0.15):
+                given = {"point_a": L * np.array((x, y, -0.1)), "normal_b": UP, "unilateral": True}
+                d.scene.add(joints.PlaneContact(box_, table, **given, **_law(d, e), **rubs))
+    table.velocity = size * rate * np.array(way)
+
+
+def rough_ropes(d, n):
+    """Pendulums with friction in their bearings, on ropes from arm to arm, or between stops."""
+    e, last, place = _upright(d), d.scene.ground, np.zeros(3)
+    for i in range(min(n, 4)):
+        body, axis = d.body(place + np.array((0.5, 0.0, 0.0)), rigid=True), (0.0, 1.0, 0.0)
+        hinge = d.scene.add(joints.Revolute.at(last, body, point=d.place(place), axis=axis))
+        d.scene.add(forces.RevoluteFriction(hinge, radius=0.1 * d.length, **_rubs(d)))
+        if d.rng.random() < 0.5:
+            d.scene.add(joints.Stop(hinge, -d.rng.uniform(0.1, 1.0), d.rng.uniform(0.1, 1.0), **_law(d, e)))
+        if i == 0 or d.rng.random() < 0.5:
+            anchor = np.array((*d.rng.uniform(0.0, 1.0, 2), 0.8)) + place
+            slack = d.length * d.rng.uniform(0.0, 0.3) + np.linalg.norm(body.position - d.place(anchor))
+            ends = [(d.scene.ground, d.place(anchor)), (body, np.zeros(3))]
+            d.scene.add(joints.Rope(ends, length=slack, **_law(d, e)))
+        last, place = body, place + np.array((1.0, 0.0, 0.0))
+
+
 CONTACTS = {each.__name__: each for each in (balls, cradle, stack, chain_over_floor, stops, ropes, play)}
+LATER_CONTACTS = {each.__name__: each for each in (bowl, coins, shaken, rough_ropes)}

@@ -15,6 +15,7 @@ from . import laws, random_scenes
 from .laws import Finding
 from .random_scenes import generate
 from .tolerances import FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SHORTER, TIGHTER
+from .twins import Mirror
 
 # Laws that compare runs of a random scene: a tighter tolerance, another method or form, the same run once more.
 #
@@ -128,8 +129,35 @@ def _mobility(scene):
 
 def with_few_impacts(case, solution, run):
     """Two methods agree after FEW_IMPACTS at most: later motions don't depend continuously on what came before."""
-    times = {t for t, *_ in solution.impulses}
-    return another_method(case, solution, run) if len(times) <= FEW_IMPACTS else []
+    case, solution = _shortened(case, solution, run)
+    return another_method(case, solution, run) if solution.success else []
+
+
+def mirrored(case, solution, run):
+    """The scene in a mirror, its parts in another order, does the same, after FEW_IMPACTS at most."""
+    case, solution = _shortened(case, solution, run)
+    mirror = Mirror(np.random.default_rng(solution.t.size).uniform(0.0, np.pi))
+    image = case._replace(scene=mirror.scene(case.scene))
+
+    def apart(options):
+        one, two = (run(each, **options) for each in (case, image))
+        seen = mirror.coordinates(case.scene, one.q[-1])
+        return _distance(image, two, seen) if one.success and two.success else np.nan
+
+    other = run(image)
+    if not (solution.success and other.success):
+        return [Finding("end of the mirrored scene", float(other.success != solution.success), 0.0, other.message)]
+    error = _distance(image, other, mirror.coordinates(case.scene, solution.q[-1]))
+    return _falling("motion of the mirrored scene", apart, error, case, run)
+
+
+def _shortened(case, solution, run):
+    """A case and its run, to the middle between the last of FEW_IMPACTS and the next one where there are more."""
+    times = sorted({t for t, *_ in solution.impulses})
+    if len(times) <= FEW_IMPACTS:
+        return case, solution
+    case = case._replace(span=(case.span[0], 0.5 * sum(times[FEW_IMPACTS - 1 : FEW_IMPACTS + 1])))
+    return case, run(case)
 
 
 OF_THE_SAME = once_more, stopped, saved, output_times
@@ -172,10 +200,10 @@ def _agreeing(law, case, solution, run, options):
 
     def apart(tighter):
         one, two = run(case, **tighter), run(case, **tighter | options | _tolerances(case, options, TIGHTER))
-        return _distance(case, one, two) if one.success and two.success else np.nan
+        return _distance(case, one, two.q[-1]) if one.success and two.success else np.nan
 
     rounded = NEAR_SINGULAR_ENDS if laws.is_near_singular(solution) else ROUNDED
-    return _falling(law, apart, _distance(case, solution, other), case, run, rounded)
+    return _falling(law, apart, _distance(case, solution, other.q[-1]), case, run, rounded)
 
 
 def _falling(law, error_of, error, case, run, rounded=ROUNDED):
@@ -202,13 +230,13 @@ def _tolerances(case, options, factor=1.0):
     return {name: factor * case.options.get(name, DEFAULT) for name in ("rtol", "atol")}
 
 
-def _distance(case, one, two):
-    """Largest distance of two runs' ends: positions in units of the scene's size, Euler parameters."""
+def _distance(case, one, q):
+    """Largest distance of the end of a run from q (n,): positions in units of the scene's size, Euler parameters."""
     scale = np.ones(one.q.shape[1])
     lengths = (one.system.bodies[:, :1] + np.arange(3)).ravel()
     scale[lengths] = max(np.abs(one.q[:, lengths] - one.q[0, lengths]).max(initial=0.0), case.length)
     far = ROUNDINGS * EPS * np.abs(one.q[:, lengths]).max(initial=0.0)
-    left = np.abs(one.q[-1] - two.q[-1])
+    left = np.abs(one.q[-1] - q)
     left[lengths] = np.maximum(left[lengths] - far, 0.0)
     return float((left / scale).max(initial=0.0))
 
@@ -247,7 +275,7 @@ def comparison(rng, case):
 
     Motions with impacts at one instant don't depend continuously on their start: methods may differ.
     """
-    served = (with_few_impacts, *OF_THE_SAME) if contacts_of(case.scene.constraints) else ALL
+    served = (with_few_impacts, mirrored, *OF_THE_SAME) if contacts_of(case.scene.constraints) else ALL
     return (served[rng.integers(len(served))],) if rng.random() < COMPARED else ()
 
 

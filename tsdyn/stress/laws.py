@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..configuration.tolerances import DENSE
-from ..constraints import PlaneContact, Rope, Stop
+from ..constraints import RollingDisc, Rope, Stop
 from ..elements.bodies import rotation_matrix, turning
 from ..elements.force import Force
 from ..elements.markers import POINT
@@ -438,6 +438,34 @@ def unilateral(solution):
         yield Finding("reactions of open contacts", float(np.abs(push[:, is_open]).max(initial=0.0)), 0.0, contact.name)
 
 
+def phases(solution):
+    """Phases follow each other: each begins where the one before it ends."""
+    if solution._phases is not None:
+        begin, end = np.array([each[:2] for each in solution.phases]).T
+        yield Finding("phases in a row", float(np.abs(begin[1:] - end[:-1]).max(initial=0.0)), 0.0)
+
+
+def rubbing(solution):
+    """Friction is within its cone where a contact sticks, and on it, against the slip, where it slides."""
+    contacts = [] if solution._phases is None else [each for each in _contacts(solution.packed) if _slips(*each)]
+    if not contacts:
+        return
+    lam, fastest = solution.multipliers, np.abs(solution.qd).max(axis=0)
+    at, largest = some(solution.t.size, limits.OUTPUTS), np.abs(lam).max(initial=0.0) or 1.0
+    slopes = [constraint_arrays(solution.packed.system, solution.q[i], solution.qd[i], solution.t[i])[1] for i in at]
+    for contact, own in contacts:
+        rows, bound = _slips(contact, own), contact.kinetic if contact.static is None else contact.static
+        N, T = -contact.sides[0].sign * lam[at, own[0]], -lam[np.ix_(at, rows)]
+        outside = float((np.linalg.norm(T, axis=1) - bound * N).max() / largest)
+        yield Finding("friction in its cone", outside, HALF_DIGITS, contact.name)
+        slip = np.array([every[rows] @ solution.qd[i] for every, i in zip(slopes, at, strict=True)])
+        speed, most = np.linalg.norm(slip, axis=1), max((np.abs(every[rows]) @ fastest).max() for every in slopes)
+        slides = ~solution.sticking(contact)[at] & (N > 0.0) & (speed > 0.0)
+        off = np.linalg.norm(T * speed[:, None] + contact.kinetic * N[:, None] * slip, axis=1)[slides]
+        share = float(off.max(initial=0.0) / (largest * most or 1.0))
+        yield Finding("friction against the slip", share, limits.RUBBED, contact.name)
+
+
 def impacts(solution):
     """What an impact changes are the momenta of its impulses, and of those of the bilateral constraints."""
     contacts = [] if solution._phases is None else list(_contacts(solution.packed))
@@ -522,13 +550,25 @@ def _gaps(contact, states):
     if isinstance(contact, Rope):
         ends = [_place(states, body, s) for body, s in contact.points]
         return [contact.length - sum(np.linalg.norm(b - a, axis=-1) for a, b in pairwise(ends))]
-    kind = "point" if isinstance(contact, PlaneContact) else "center"
-    s_a, s_b = (getattr(contact, f"{kind}_{x}") for x in "ab")
-    d, radius = _place(states, contact.a, s_a) - _place(states, contact.b, s_b), getattr(contact, "radius_a", 0.0)
+    point, base = next(pair for pair in POINTS if all(hasattr(contact, name) for name in pair))
+    d = _place(states, contact.a, getattr(contact, point)) - _place(states, contact.b, getattr(contact, base))
     if contact.normal_b is not None:
-        return [(d * _turned(states, contact.b, contact.normal_b)).sum(axis=-1) - radius]
+        n = _turned(states, contact.b, contact.normal_b)
+        return [(d * n).sum(axis=-1) - _reach(contact, states, n)]
     away = np.linalg.norm(d, axis=-1)
+    radius = contact.radius_a
     return [contact.radius_b - radius - away if contact.inside else away - radius - contact.radius_b]
+
+
+POINTS = ("center_a", "center_b"), ("center_a", "point_b"), ("point_a", "point_b")
+
+
+def _reach(contact, states, n):
+    """How far a body reaches from its centre or point towards a plane with the normal n."""
+    if isinstance(contact, RollingDisc):
+        across = (_turned(states, contact.a, contact.axis_a) * n).sum(axis=-1)
+        return contact.radius * np.sqrt(1.0 - across**2) + contact.tyre_radius
+    return getattr(contact, "radius_a", getattr(contact, "radius", 0.0))
 
 
 def _place(states, body, s):
@@ -539,7 +579,7 @@ def _turned(states, body, s):
     return np.asarray(s, float) if body.dimension == 0 else states.rotation(body) @ np.asarray(s, float)
 
 
-LAWS = (finite, constraints, newton_euler, dense_output, motors, unilateral, impacts)
+LAWS = (finite, constraints, newton_euler, dense_output, motors, unilateral, phases, rubbing, impacts)
 
 
 def findings(solution, laws=LAWS):

@@ -10,7 +10,7 @@ from ..integrators import Nystrom4
 from ..motions import Sine, time
 from ..motions.tables import Table
 from ..simulation.scene import Scene
-from .contact_scenes import CONTACTS
+from . import contact_scenes
 
 # Bodies, joints, motors, springs, ropes, rollers and friction of the random scenes, in random units.
 
@@ -328,6 +328,16 @@ def lopsided(d, n):
     tree(d, n)
 
 
+def limited(d, n):
+    """A tree, whose hinges and slides have stops."""
+    tree(d, n)
+    for joint in d.scene.constraints:
+        if isinstance(joint, (joints.Revolute, joints.Translational)) and d.rng.random() < 0.7:
+            bounds = d.rng.uniform(0.0, 0.5, 2) * (1.0 if isinstance(joint, joints.Revolute) else d.length)
+            e = float(d.rng.choice(contact_scenes.RESTITUTIONS))
+            d.scene.add(joints.Stop(joint, -bounds[0], bounds[1], restitution=e))
+
+
 FIRST = {
     each.__name__: each
     for each in (
@@ -335,7 +345,10 @@ FIRST = {
     )
 }  # fmt: skip
 LATER = {each.__name__: each for each in (coupled, rolling)}
+LATER_CONTACTS = contact_scenes.LATER_CONTACTS | {"limited": limited}
+CONTACTS = contact_scenes.CONTACTS | LATER_CONTACTS
 KINDS = FIRST | LATER | CONTACTS
+KINDS_OF_SEEDS = {0: LATER, 10: LATER, 4: contact_scenes.CONTACTS, 14: LATER_CONTACTS}
 
 
 def generate(seed, least=None, most=None):
@@ -343,8 +356,7 @@ def generate(seed, least=None, most=None):
 
     Kinds that were added later have seeds of their own, so that scenes of known seeds stay the same.
     """
-    kinds = {0: LATER, 4: CONTACTS}.get(seed % 10, FIRST)
-    return drawn(np.random.default_rng(seed), least, most, kinds)
+    return drawn(np.random.default_rng(seed), least, most, KINDS_OF_SEEDS.get(seed % 20, FIRST))
 
 
 def drawn(rng, least=None, most=None, kinds=KINDS):

@@ -24,3 +24,6 @@ OUTPUTS, BODIES = 25, 12
 # Gaps below zero, of the largest coordinate (m) or in rad; momenta that no impulse explains, of the largest: rounding
 # where units of lengths and angles differ by 1e6. Impacts of a run that are judged.
 PENETRATED, IMPACTED, IMPACTS = 1e-11, 1e-8, 12
+# Friction that is not against the slip, times the slip, of the largest reaction and velocity: slow slips have the
+# direction of one shortly before.
+RUBBED = 1e-5

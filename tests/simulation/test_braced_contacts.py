@@ -1,4 +1,4 @@
-"""Contacts with friction that brace each other: reactions that are not unique, redundant rows, none without a load."""
+"""Contacts with friction that brace each other: reactions that aren't unique, redundant rows, none without a load."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 import tsdyn as ts
 
 C = ts.constraints
-G = 10.0
+G = 9.81
 
 
 @pytest.mark.parametrize("order", [1, -1])

@@ -15,22 +15,23 @@ from typing import NamedTuple
 import numpy as np
 
 import tsdyn as ts
-from benchmarks import mechanisms
 from benchmarks.peers.heyoka import Heyoka, integrator
+from benchmarks.scenes import of_file
 from examples import coin
 from tests.helpers.closed_loops import bricard
 from tsdyn.observables.diagnostics import body_motions
+from tsdyn.stress import rods
 
 EPS, OUTPUTS, DENSE, FIRST = np.finfo(float).eps, 32, 300, 1e4
 
 
 def _chain():
-    return mechanisms.build(mechanisms.chain(4) | {"forces": []})
+    return rods.build(rods.chain(4) | {"forces": []})
 
 
 SCENES = {
-    "top": lambda: mechanisms.build(mechanisms.of_file("sliding_top")),
-    "pendulum": lambda: mechanisms.build(mechanisms.of_file("two_body_pendulum_spatial")),
+    "top": lambda: rods.build(of_file("sliding_top")),
+    "pendulum": lambda: rods.build(of_file("two_body_pendulum_spatial")),
     "chain": _chain,
     "bricard": bricard,
     "disc": lambda: coin.rolling(0.3, (0.4, 8.0, 1.5)),
@@ -118,7 +119,7 @@ def heyoka(steps, count):
     """The top by heyoka in minimal coordinates, with its default tolerance, eps, and high accuracy."""
     scene = SCENES["top"]()
     body = scene.bodies[0]
-    taylor = integrator(mechanisms.of_file("sliding_top"), tol=EPS, high_accuracy=True)
+    taylor = integrator(of_file("sliding_top"), tol=EPS, high_accuracy=True)
     energy = []
     for state in starts(scene, count):
         p, pd = state.q[3:7], state.qd[3:7]

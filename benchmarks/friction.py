@@ -16,14 +16,14 @@ TOLERANCES = 1e-6, 1e-8, 1e-10
 
 
 def build(count, rough, slip=0.05):
-    """A chain of hinged links, released from the horizontal; rough or smooth."""
+    """A chain of links on pins, released from the horizontal; rough or smooth."""
     scene = ts.Scene()
     last = scene.ground
     for i in range(count):
         link = scene.add_body(1.0, (0.002, 0.02, 0.02), position=(0.25 + 0.5 * i, 0, 0), name=f"link {i}")
-        hinge = scene.add(ts.constraints.Revolute.at(link, last, point=(0.5 * i, 0, 0), axis=(0, 1, 0)))
+        pin = scene.add(ts.constraints.Revolute.at(link, last, point=(0.5 * i, 0, 0), axis=(0, 1, 0), name=f"pin {i}"))
         if rough:
-            scene.add(ts.forces.RevoluteFriction(hinge, radius=0.02, kinetic=0.2, static=0.3, slip_velocity=slip))
+            scene.add(ts.forces.RevoluteFriction(pin, radius=0.02, kinetic=0.2, static=0.3, slip_velocity=slip))
         last = link
     return scene
 

@@ -17,16 +17,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks import mechanisms, provenance
+from benchmarks import provenance
+from tsdyn.stress import rods
 
 SPAN, TOL, TIGHT = (0.0, 0.2), 1e-6, 1e-11
 METHODS = None, "dop853"
 MAKE = {
-    "chain": mechanisms.chain,
-    "tree": mechanisms.tree,
-    "hub": mechanisms.hub,
-    "loop": mechanisms.loop,
-    "net": lambda n: mechanisms.net(n, n),
+    "chain": rods.chain,
+    "tree": rods.tree,
+    "hub": rods.hub,
+    "loop": rods.loop,
+    "net": lambda n: rods.net(n, n),
 }
 SIZES = {
     "chain": (1, 4, 16, 64, 256, 1024, 4096, 10000),
@@ -60,7 +61,7 @@ def one(family, size, enough=1.0):
     import tsdyn as ts
 
     marks = [time.perf_counter()]
-    scene = mechanisms.build(MAKE[family](size))
+    scene = rods.build(MAKE[family](size))
     marks.append(time.perf_counter())
     ts.simulate(scene, SPAN, rtol=TOL, atol=TOL, t_eval=SPAN, max_steps=2)
     marks.append(time.perf_counter())

@@ -1,6 +1,6 @@
 """The scenes of the benchmarks by name, and reference solutions for their final states.
 
-SCENES["chain of 64"].build(), .end (s), .definition() (plain data, see mechanisms.py), .reference()
+SCENES["chain of 64"].build(), .end (s), .definition() (plain data, see tsdyn.stress.rods), .reference()
 
 Errors are the largest over positions (m) and rotation matrices at the end. References are read from tests/references
 where there is a file; else two methods that share no code, or as little as can be, are refined until they agree:
@@ -20,10 +20,17 @@ from typing import NamedTuple
 import numpy as np
 
 import tsdyn as ts
-from benchmarks import mechanisms, stiff
+from benchmarks import stiff
 from tsdyn.measuring.benchmark import Reference, agreed, poses
+from tsdyn.stress import rods
 
 KEPT = Path(__file__).parent / "results" / "references"
+FOLDER = Path(__file__).parents[1] / "tests" / "references"
+
+
+def of_file(name):
+    """Read the definition of a reference's file."""
+    return json.loads((FOLDER / f"{name}.json").read_text())["definition"]
 
 
 class Benchmarked(NamedTuple):
@@ -50,11 +57,11 @@ class Benchmarked(NamedTuple):
 
     def build(self):
         """Make the ts.Scene."""
-        return self.maker() if self.maker else mechanisms.build(self.definition())
+        return self.maker() if self.maker else rods.build(self.definition())
 
     def known(self):
         """The `Reference` of its file in tests/references, or None."""
-        path = mechanisms.FOLDER / f"{self.file}.json"
+        path = FOLDER / f"{self.file}.json"
         if not (self.file and path.exists()):
             return None
         data = json.loads(path.read_text())
@@ -103,7 +110,7 @@ class Benchmarked(NamedTuple):
 def _file(name, family, size, end, **options):
     title = {"top": "sliding top", "pendulum": "two-body pendulum"}.get(family, f"chain of {size}")
     title += " in space" if name.endswith("spatial") else ""
-    return Benchmarked(title, family, size, end, lambda: mechanisms.of_file(name), name, **options)
+    return Benchmarked(title, family, size, end, lambda: of_file(name), name, **options)
 
 
 def chain(links):
@@ -115,7 +122,7 @@ def chain(links):
         "chain",
         links,
         1.0,
-        lambda: mechanisms.chain(links),
+        lambda: rods.chain(links),
         name,
         steps=(1e-2, 3e-3),
         without=without,
@@ -125,18 +132,18 @@ def chain(links):
 def tree(levels):
     """A binary tree."""
     size = 2**levels - 1
-    return Benchmarked(f"tree of {size}", "tree", size, 1.0, lambda: mechanisms.tree(levels))
+    return Benchmarked(f"tree of {size}", "tree", size, 1.0, lambda: rods.tree(levels))
 
 
 def loop(links):
     """A chain hung from both ends."""
-    return Benchmarked(f"loop of {links}", "loop", links, 1.0, lambda: mechanisms.loop(links))
+    return Benchmarked(f"loop of {links}", "loop", links, 1.0, lambda: rods.loop(links))
 
 
 def net(meshes):
     """A square net."""
     size = 2 * meshes * (meshes + 1)
-    return Benchmarked(f"net of {meshes} x {meshes}", "net", size, 0.5, lambda: mechanisms.net(meshes, meshes))
+    return Benchmarked(f"net of {meshes} x {meshes}", "net", size, 0.5, lambda: rods.net(meshes, meshes))
 
 
 def _stiff(name, maker):

@@ -11,10 +11,12 @@ import tsdyn as ts
 from docs.painting import markers, paint
 from tsdyn.drawing import BLUE, GREY, new_figure
 from tsdyn.errors import TsdynError
+from tsdyn.measuring.haug_tables import sliding_top
 
 WIDTH, HEIGHT, DPI, COLOURS = 4.2, 3.0, 130, 64
 END = 1.0  # s, of scenes that an example doesn't run
 TOLERANCES = tuple(10.0**-k for k in range(3, 12))
+NUTATING = (0.5, 0.0, 12.0)  # rad/s, of the top that methods are compared on
 STEPS = tuple(0.05 / 2**k for k in range(7))  # s
 
 
@@ -61,14 +63,6 @@ def example_run(example):
     return None if scene is None or not scene.bodies else ts.simulate(scene, (0.0, END))
 
 
-def nutating_top():
-    """The scene that methods are compared on: a heavy top that slides and nutates."""
-    scene = ts.Scene(gravity=(0.0, 0.0, -9.6))
-    top = scene.add_body(30.0, (90.0, 90.0, 30.0), (0.0, 0.0, 1.0), angular_velocity=(0.5, 0.0, 12.0), name="top")
-    scene.add(ts.constraints.PlaneContact(top, scene.ground, point_a=(0, 0, -1), normal_b=(0, 0, 1), name="tip"))
-    return scene
-
-
 def settings(cls):
     """Instances of a method from loose to tight: by tolerances, or by fixed steps."""
     for tolerance, step in zip(TOLERANCES, (*STEPS, None, None), strict=True):
@@ -82,8 +76,8 @@ def settings(cls):
 @cache
 def work_and_error(cls):
     """Evaluations and errors (k,) each of a method for 2 s of the top."""
-    exact = ts.simulate(nutating_top(), (0.0, 2.0), integrator=ts.integrators.Taylor(tol=1e-15)).q[-1]
-    runs = [ts.simulate(nutating_top(), (0.0, 2.0), integrator=method) for method in settings(cls)]
+    exact = ts.simulate(sliding_top(NUTATING), (0.0, 2.0), integrator=ts.integrators.Taylor(tol=1e-15)).q[-1]
+    runs = [ts.simulate(sliding_top(NUTATING), (0.0, 2.0), integrator=method) for method in settings(cls)]
     work = np.array([run.stats.evaluations for run in runs])
     return work, np.maximum([np.abs(run.q[-1] - exact).max() for run in runs], 1e-16)
 

@@ -321,6 +321,7 @@ def test_sampled_loads_are_replaced_as_actuators_and_refused_beside_them():
         scene.inverse_dynamics(SWING, ["servo of shoulder", "elbow"], [0.0, 0.2])
 
 
+@pytest.mark.slow_for("True")
 @pytest.mark.parametrize("by_force", [False, True])
 def test_actuators_of_a_scene_with_other_parameters(by_force):
     scene = arm()

@@ -76,6 +76,7 @@ def test_springs_that_begin_slack_hang():
     assert found.steps < 40
 
 
+@pytest.mark.slow
 def test_what_slides_is_seen_soon_and_a_stop_far_away_is_found():
     scene = ts.Scene(gravity=DOWN)
     cart = scene.add_body(1.0, (1, 1, 1), name="cart")

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from benchmarks import mechanisms
 from tests.helpers.sketched_mechanisms import MECHANISMS
 from tests.helpers.sketches import Builder, polar
 from tests.helpers.tolerances import CLOSE
 from tsdyn.configuration import continuation as kinetic
 from tsdyn.observables.evaluate import constraint_arrays
+from tsdyn.stress import rods as mechanisms
 
 C = ts.constraints
 Z = np.array([0.0, 0.0, 1.0])

@@ -271,7 +271,7 @@ def test_a_function_of_angles_and_travels_in_a_chain():
     assert (again.q == ts.simulate(crane(lift)[0], (0.0, 1.0)).q).all()
 
 
-@pytest.mark.slow_for("dd", "ada")
+@pytest.mark.slow_for("dd", "ada", "da")
 @pytest.mark.parametrize("kinds", ["aa", "da", "dd", "ada"])
 def test_kernels_and_series_of_functions_of_several(kinds):
     def make(a, b):

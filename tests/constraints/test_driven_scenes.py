@@ -8,7 +8,6 @@ import pytest
 import tsdyn as ts
 from tests.helpers.driven import METHODS, Z, everything, held, rotor
 from tests.helpers.tolerances import CLOSE, EPS, HELD, NEAR, ROUNDING, TIGHT
-from tsdyn.taylor import layout as expansion_pack
 
 C, M = ts.constraints, ts.motions
 
@@ -25,16 +24,6 @@ def test_all_methods_agree():
     for name, q in ends.items():
         np.testing.assert_allclose(q, ends["taylor"], atol=1e-6 if name == "sdirk54" else 1e-8, err_msg=name)
     assert ts.simulate(scene, (0.0, 0.1)).method.startswith("Taylor")
-
-
-@pytest.mark.slow
-def test_series_of_many_bodies_are_the_same(monkeypatch):
-    """The loops that bring numbers into the cache ahead."""
-    ends = []
-    for limit in (expansion_pack.FAR, 0):
-        monkeypatch.setattr(expansion_pack, "FAR", limit)
-        ends.append(ts.simulate(everything(), (0.0, 0.3), **METHODS["taylor"]).raise_if_failed().q[-1])
-    np.testing.assert_array_equal(*ends)
 
 
 def test_both_forms_agree_to_rounding():

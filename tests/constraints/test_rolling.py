@@ -216,6 +216,7 @@ def test_ball_across_a_level_cylinder(inside):
     assert (np.isfinite(solution.friction_demand(contact)) == held).all()
 
 
+@pytest.mark.slow
 def test_rattleback_reverses_its_spin():
     """Spun against its sense it wobbles, stops and turns back; with it, it goes on. Kane's and Levinson's stone."""
     inertia = np.array(((2e-4, -2e-5, 0), (-2e-5, 1.6e-3, 0), (0, 0, 1.7e-3)))

@@ -67,6 +67,7 @@ STUDIES = {
 }
 
 
+@pytest.mark.slow_for("damped", "loop", "sleigh")
 @pytest.mark.parametrize("name", STUDIES)
 def test_lanes_agree_with_runs_alone(name, monkeypatch):
     build, end, table = STUDIES[name]

@@ -170,7 +170,6 @@ def test_the_message_says_how_to_go_on(tmp_path):
     assert "state=solution.state" in plain.message
 
 
-@pytest.mark.usefixtures("short_slices")
 def bouncing():
     scene = ts.Scene()
     ball = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(0.0, 0.0, 1.0), velocity=(1.0, 0.0, 0.0))
@@ -243,14 +242,20 @@ def test_runs_that_turn_to_an_implicit_method(count, tmp_path, monkeypatch):
     assert again.method == whole.method
 
 
+def hinged():
+    """A scene with a rod on a hinge, released from the horizontal."""
+    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+    rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    at = {"point": (0, 0, 0), "axis": (0, 1, 0)}
+    return scene, rod, scene.add(ts.constraints.Revolute.at(rod, scene.ground, **at, name="hinge"))
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("short_slices")
 @pytest.mark.parametrize("method", ["taylor", "dop853", "sdirk54"])
 def test_friction_of_joints(method, tmp_path):
     def build():
-        scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
-        rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
-        hinge = scene.add(ts.constraints.Revolute.at(rod, scene.ground, point=(0, 0, 0), axis=(0, 1, 0)))
+        scene, _, hinge = hinged()
         scene.add(ts.forces.RevoluteFriction(hinge, kinetic=0.2, radius=0.05))
         return scene
 
@@ -277,9 +282,7 @@ def test_friction_that_comes_to_rest(tmp_path, short_slices):
 
 
 def controlled():
-    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
-    rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
-    hinge = scene.add(ts.constraints.Revolute.at(rod, scene.ground, point=(0, 0, 0), axis=(0, 1, 0)))
+    scene, _, hinge = hinged()
     scene.add(ts.forces.JointTorque(hinge, function=lambda t, angle, rate: -2.0 * rate, period=0.05))
     return scene
 
@@ -304,10 +307,8 @@ class Late:
 
 
 def delayed():
-    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
-    rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
-    scene.add(ts.constraints.Revolute.at(rod, scene.ground, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
-    scene.add(ts.forces.Control(Late(), ["hinge"], period=0.05))
+    scene, _, hinge = hinged()
+    scene.add(ts.forces.Control(Late(), [hinge], period=0.05))
     return scene
 
 
@@ -318,9 +319,7 @@ def test_what_a_digital_controller_keeps(tmp_path):
 
 def loaded():
     """Every sort of load that has a series: of state, of time, data, friction."""
-    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
-    rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
-    scene.add(ts.constraints.Revolute.at(rod, scene.ground, point=(0, 0, 0), axis=(0, 1, 0)))
+    scene, rod, _ = hinged()
     scene.add(ts.forces.PointForce(rod, force=lambda t, state: (-state[7], 0.0, np.sin(t))))
     scene.add(ts.forces.Torque(rod, torque=lambda t: (0.0, np.cos(3.0 * t), 0.0)))
     table = ts.Table((0.0, 0.4, 1.1, 2.0), (0.0, 1.0, -1.0, 0.5))

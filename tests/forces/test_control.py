@@ -145,6 +145,7 @@ def test_user_force_of_the_scene_acts_and_reacts():
     assert np.abs(found[0] - found[1]).max() < ALGEBRA * np.abs(found[0]).max()
 
 
+@pytest.mark.slow
 def test_loads_of_the_scene_are_those_of_arrays(rng):
     """Random laws of point loads in both frames, on a rigid body and on a point mass."""
     w = rng.normal(size=13)

@@ -186,21 +186,13 @@ def test_a_spring_shrunk_to_nothing_turns_its_direction():
     np.testing.assert_array_equal(np.sign(solution.reaction(spring)[0][:, 0]), np.sign(solution.t - 1.0 + 0.1))
 
 
-def test_a_spring_has_no_direction_at_rest_at_its_anchor():
+@pytest.mark.parametrize("free_length", [None, 0.5])
+def test_a_spring_has_no_direction_at_rest_at_its_anchor(free_length):
     scene = ts.Scene(gravity=(0, 0, 0))
     mass = scene.add_point_mass(1.0, (1, 0, 0))
-    scene.add(F.Spring(scene.ground, mass, stiffness=9.0, free_length=0.5, name="strut"))
+    scene.add(F.Spring(scene.ground, mass, stiffness=9.0, free_length=free_length, name="strut"))
     mass.position = (0, 0, 0)
-    with pytest.raises(ts.InconsistentState, match="strut"):
-        ts.simulate(scene, (0, 1))
-
-
-def test_a_spring_that_starts_at_nothing_is_refused():
-    scene = ts.Scene()
-    mass = scene.add_point_mass(1.0, (1, 0, 0))
-    scene.add(F.Spring(scene.ground, mass, stiffness=1.0))
-    mass.position = (0, 0, 0)
-    with pytest.raises(ts.InconsistentState, match="finite"):
+    with pytest.raises(ts.InconsistentState, match=r"finite.*strut"):
         ts.simulate(scene, (0, 1))
 
 

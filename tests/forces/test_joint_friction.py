@@ -22,11 +22,14 @@ from tests.helpers.tolerances import ALGEBRA, CLOSE, FAIR, FINE, HELD, NEAR, TIG
 C, F = ts.constraints, ts.forces
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("formulation", ["tangent", "null-space", "maggi-kane"])
-def test_a_block_on_a_slope_brakes_as_it_should(formulation):
+@pytest.mark.slow_but("taylor-*")
+@pytest.mark.parametrize(
+    ("method", "formulation"),
+    [("taylor", "tangent"), ("dop853", "tangent"), ("dop853", "null-space"), ("dop853", "maggi-kane")],
+)
+def test_a_block_on_a_slope_brakes_as_it_should(method, formulation):
     scene, body, contact, friction, along = block(0.3, 0.5, 3.0, slip_velocity=1e-7)
-    solution = ts.simulate(scene, (0.0, 0.4), formulation=formulation, **PRECISE)
+    solution = ts.simulate(scene, (0.0, 0.4), formulation=formulation, **PRECISE | {"integrator": method})
     rate = -G * (np.sin(0.5) + 0.3 * np.cos(0.5))
     assert solution.success
     np.testing.assert_allclose(solution.position(body)[-1], (3.0 * 0.4 + rate * 0.08) * along, atol=HELD)
@@ -116,10 +119,12 @@ def test_implicit_and_fixed_steps_and_dense_output_agree():
     np.testing.assert_allclose(again.multipliers[0], state.multipliers, atol=TIGHT)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("formulation", ["tangent", "null-space"])
+@pytest.mark.slow_but("0.5-0.4-taylor-*")
+@pytest.mark.parametrize(
+    ("method", "formulation"), [("taylor", "tangent"), ("dop853", "tangent"), ("dop853", "null-space")]
+)
 @pytest.mark.parametrize(("length", "width"), [(None, None), (0.5, None), (None, 0.4), (0.5, 0.4)])
-def test_a_slide_that_is_tilted_in_its_guide(length, width, formulation):
+def test_a_slide_that_is_tilted_in_its_guide(length, width, method, formulation):
     """Torques of the load at (0, 0.2, 0.3): 0.2 * 4 about x, 0.3 * 6 about y, -0.2 * 6 about z."""
     scene, body, guide, friction = slide(length, width)
     N = 2.0 * G - 4.0
@@ -127,7 +132,7 @@ def test_a_slide_that_is_tilted_in_its_guide(length, width, formulation):
     N += 0.0 if length is None else 2.0 / length * np.hypot(1.8, 1.2)
     acceleration = (6.0 - 0.25 * N) / 2.0
     end = min(0.5, 0.9 * 1.5 / max(-acceleration, 1e-9))  # while it slides on
-    solution = ts.simulate(scene, (0.0, end), formulation=formulation, **PRECISE)
+    solution = ts.simulate(scene, (0.0, end), formulation=formulation, **PRECISE | {"integrator": method})
     np.testing.assert_allclose(solution.position(body)[-1, 0], 1.5 * end + 0.5 * acceleration * end**2, atol=TIGHT)
     np.testing.assert_allclose(solution.reaction(friction)[0][:, 0], -0.25 * N, rtol=TIGHT)
     demand_balance(scene, solution, (guide, friction, *scene.forces[1:]))

@@ -8,13 +8,11 @@ import tsdyn as ts
 from tests.helpers.rough_joints import (
     G,
     SmoothBall,
-    block,
     chain,
     demand_balance,
     four_bar,
     pendulum,
     pendulum_rates,
-    slide,
 )
 from tests.helpers.tolerances import ALGEBRA, CLOSE, HELD, NEAR
 from tsdyn.jit.kernels import twin
@@ -36,11 +34,6 @@ def wheel(push, **more):
     return scene, body
 
 
-@pytest.mark.parametrize("kind", [F.RevoluteFriction, F.TranslationalFriction, F.ContactFriction])
-def test_the_series_are_those_of_the_law(kind):
-    ts.testing.check_force(kind, states=1)
-
-
 def test_checker_names_the_coefficient():
     of_law, of_load = twin(F.ContactFriction.series), twin(F.ContactFriction.normal_series)
 
@@ -60,22 +53,6 @@ def test_checker_names_the_coefficient():
         force = kind.example(np.random.default_rng(1), scene.add_body(1.0, (1, 1, 1)), scene.ground)
         with pytest.raises(ts.testing.CheckFailed, match=f"coefficient {message}"):
             check_friction_series(scene, scene.add(force), "Broken", np.random.default_rng(2))
-
-
-def test_a_block_on_a_slope():
-    scene, body, contact, friction, along = block(0.3, 0.5, 3.0, slip_velocity=1e-7)
-    solution = ts.simulate(scene, (0.0, 0.4), **PRECISE)
-    rate = -G * (np.sin(0.5) + 0.3 * np.cos(0.5))
-    np.testing.assert_allclose(solution.position(body)[-1], (3.0 * 0.4 + rate * 0.08) * along, atol=HELD)
-    demand_balance(scene, solution, (contact, friction))
-
-
-def test_a_tilted_slide():
-    scene, body, guide, friction = slide(0.5, 0.4)
-    acceleration = (6.0 - 0.25 * (2.0 * G - 4.0 + 0.8 / 0.4 + 2.0 / 0.5 * np.hypot(1.8, 1.2))) / 2.0
-    solution = ts.simulate(scene, (0.0, 0.4), **PRECISE)
-    np.testing.assert_allclose(solution.position(body)[-1, 0], 1.5 * 0.4 + 0.08 * acceleration, atol=HELD)
-    demand_balance(scene, solution, (guide, friction, *scene.forces[1:]))
 
 
 def test_a_pendulum_against_minimal_coordinates_and_stages():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from benchmarks import friction
 from tests.helpers.tolerances import FINE
 from tsdyn.simulation import phase_scenes
 
@@ -53,22 +54,10 @@ def test_each_block_on_a_belt_has_the_period_of_one_alone(packs):
     assert len(packs) <= 4  # the whole scene's gaps, with open contacts, and with all rows that hold frictions
 
 
-def rough_chain(count):
-    """Links on rough pins, released from the horizontal."""
-    scene = ts.Scene()
-    last = scene.ground
-    for i in range(count):
-        link = scene.add_body(1.0, (0.002, 0.02, 0.02), position=(0.25 + 0.5 * i, 0, 0), name=f"link {i}")
-        pin = scene.add(C.Revolute.at(link, last, point=(0.5 * i, 0, 0), axis=(0, 1, 0)))
-        scene.add(F.RevoluteFriction(pin, radius=0.02, kinetic=0.2, static=0.3, name=f"pin {i}"))
-        last = link
-    return scene
-
-
 def test_a_chain_of_rough_pins(packs):
     """What sticks doesn't turn, all else does, and friction takes what energy is lost."""
     count = 18
-    solution = ts.simulate(rough_chain(count), (0.0, 2e-3), dense_output=True)
+    solution = ts.simulate(friction.build(count, rough=True, slip=0.0), (0.0, 2e-3), dense_output=True)
     kinds = {names for *_, names in solution.phases}
     assert len(kinds) > 8
     assert len(packs) <= 4
@@ -77,7 +66,7 @@ def test_a_chain_of_rough_pins(packs):
     states, held = solution.at(middles), [names for *_, names in solution.phases]
     spins = np.array([states.angular_velocity(f"link {i}")[:, 1] for i in range(count)])
     turns = np.abs(np.diff(spins, axis=0, prepend=0.0))
-    sticks = np.array([[f"pin {i}" in names for names in held] for i in range(count)])
+    sticks = np.array([[f"RevoluteFriction(pin {i})" in names for names in held] for i in range(count)])
     assert turns[sticks].max() < FINE
     assert turns[~sticks].max() > 1e3 * FINE
     assert solution.constraint_error.position.max() < 1e-12
@@ -86,7 +75,7 @@ def test_a_chain_of_rough_pins(packs):
 @pytest.mark.slow
 def test_sixty_rough_pins():
     """Pins that are held while they still turn by what the time leaves open come to rest, and the run goes on."""
-    solution = ts.simulate(rough_chain(60), (0.0, 5e-4), dense_output=True)
+    solution = ts.simulate(friction.build(60, rough=True, slip=0.0), (0.0, 5e-4), dense_output=True)
     assert solution.success, solution.message
     np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=FINE)
     assert solution.constraint_error.velocity.max() < FINE

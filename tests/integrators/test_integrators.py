@@ -28,7 +28,7 @@ def restore_registry():
 @pytest.fixture
 def one_scene(monkeypatch):
     """The quickest of the scenes only."""
-    monkeypatch.setattr(integrator_scenes, "SCENES", {"sliding top": (integrator_scenes.sliding_top, 10.0)})
+    monkeypatch.setattr(integrator_scenes, "SCENES", {"sliding top": integrator_scenes.SCENES["sliding top"]})
 
 
 @pytest.mark.slow_but("Taylor")
@@ -212,7 +212,7 @@ def test_limits_that_are_not_kept(monkeypatch):
 
 
 def test_constraint_errors_are_seen():
-    scene = integrator_scenes.two_body_pendulum()
+    scene = integrator_scenes.turning_pendulum()
     solution = ts.simulate(scene, (0.0, 0.1), integrator=I.Nystrom4(0.01))
     integrator_checks.demand_levels(solution, "here")
     for name, level in (("q", "position"), ("qd", "velocity"), ("qdd", "acceleration")):

@@ -1,7 +1,6 @@
 """Nystrom4 against the references: its order, whatever the charts are, and the tableaus that are refused."""
 
 import dataclasses
-from functools import cache
 
 import numpy as np
 import pytest
@@ -15,10 +14,7 @@ from tsdyn.methods.tableau import NystromTableau, RungeKuttaTableau
 SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")
 END = 10.0  # s
 STEPS = tuple(1 / (160 * 2**j) for j in range(6))  # s
-NO_INTERVALS = (None,) * len(STEPS)
-NEVER = 10**9  # a chart_interval that forces no chart
 ORDER_TOL = 0.15
-LAST = slice(-1, None)
 
 
 def run(name, step, end=END, **options):
@@ -27,17 +23,6 @@ def run(name, step, end=END, **options):
     reference = reference.until(end)
     integrator = ts.integrators.Nystrom4(step=step)
     return ts.simulate(scene, (0.0, end), integrator=integrator, t_eval=reference.t, **options), reference
-
-
-@cache
-def study(name, steps=STEPS, intervals=NO_INTERVALS):
-    """Runs with these steps and chart intervals: solutions, errors, errors at the end."""
-    runs = [run(name, h, chart_interval=interval) for h, interval in zip(steps, intervals, strict=True)]
-    return (
-        [solution for solution, _ in runs],
-        np.array([error(*pair) for pair in runs]),
-        np.array([error(*pair, LAST) for pair in runs]),
-    )
 
 
 def slope(errors, steps=STEPS):
@@ -60,39 +45,14 @@ def change(one, two):
 @pytest.mark.slow_but("sliding_top")
 @pytest.mark.parametrize("name", SCENES)
 def test_order(name):
-    solutions, errors, _ = study(name)
+    runs = [run(name, step) for step in STEPS]
+    errors = np.array([error(*pair) for pair in runs])
     assert 1e-6 < errors[0] < LOOSE
     assert errors[-1] < FINE
     assert abs(slope(errors) - 4.0) < ORDER_TOL
-    for solution in solutions:
-        own = [reason for reason in solution.charts.reason if reason not in ("start", "chart_interval")]
+    for solution, _ in runs:
+        own = [reason for reason in solution.charts.reason if reason != "start"]
         assert len(own) >= 10
-
-
-@pytest.mark.slow_but("sliding_top")
-@pytest.mark.parametrize("name", SCENES)
-def test_order_with_charts_at_given_instants(name):
-    """A new chart every 1/32 s."""
-    solutions, errors, _ = study(name, intervals=tuple(5 * 2**j for j in range(len(STEPS))))
-    assert abs(slope(errors) - 4.0) < ORDER_TOL
-    assert all("chart_interval" in solution.charts.reason for solution in solutions)
-
-
-@pytest.mark.slow_but("*sliding_top")
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("interval", [1, 10, 50])
-def test_a_chart_every_so_many_steps_keeps_the_order(name, interval):
-    """The charts shrink with the step, and with them their share of the error: the slope can exceed 4.
-
-    Without the finest step, where the rounding of 50000 charts begins to show.
-    """
-    steps = STEPS[:-1]
-    free, _, free_errors = study(name, steps, (NEVER,) * len(steps))
-    forced, errors, _ = study(name, steps, (interval,) * len(steps))
-    assert slope(errors, steps) > 4.0 - ORDER_TOL
-    for one, two, truncation in zip(free, forced, free_errors, strict=True):
-        assert two.stats.charts >= two.stats.steps // interval
-        assert change(one, two) < truncation
 
 
 @pytest.mark.slow_but("*sliding_top")

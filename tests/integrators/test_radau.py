@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import tsdyn as ts
+from benchmarks import friction
 from benchmarks.stiff import hung, jointed
 from benchmarks.stiff_chain import chain
 from tests.helpers import closed_loops, locked_scenes, rough_joints
@@ -281,26 +282,15 @@ def test_the_interpolant_is_exact_for_polynomials(order):
     np.testing.assert_allclose(state.qdd[:, 0], force(t), rtol=0, atol=1e3 * EPS)
 
 
-def exact_chain(links=4):
-    """Links on rough pins of the exact law, released from the horizontal: each pin stops and turns back."""
-    scene = ts.Scene()
-    last = scene.ground
-    for i in range(links):
-        link = scene.add_body(1.0, (0.002, 0.02, 0.02), position=(0.25 + 0.5 * i, 0, 0), name=f"link{i}")
-        pin = scene.add(ts.constraints.Revolute.at(link, last, point=(0.5 * i, 0, 0), axis=(0, 1, 0), name=f"pin{i}"))
-        scene.add(ts.forces.RevoluteFriction(pin, radius=0.02, kinetic=0.2, static=0.3))
-        last = link
-    return scene
-
-
 @compiles
 @pytest.mark.parametrize("method", [I.Radau, I.SDIRK54])
 def test_pins_that_stick_and_slide_by_the_exact_law(method):
-    """The phases and the motion of series; no steps towards the events, which end a phase where they are."""
-    exact = ts.simulate(exact_chain(), (0.0, 1.0), rtol=1e-11, atol=1e-11)
-    found = ts.simulate(exact_chain(), (0.0, 1.0), integrator=method(1e-8, 1e-8)).raise_if_failed()
+    """Each pin stops and turns back as by series; no steps towards the events, which end a phase where they are."""
+    scene = friction.build(4, rough=True, slip=0.0)
+    exact = ts.simulate(scene, (0.0, 1.0), rtol=1e-11, atol=1e-11)
+    found = ts.simulate(scene, (0.0, 1.0), integrator=method(1e-8, 1e-8)).raise_if_failed()
     assert [names for *_, names in found.phases] == [names for *_, names in exact.phases] == [
-        (), ("RevoluteFriction(pin1)",), ()
+        (), ("RevoluteFriction(pin 1)",), ()
     ]  # fmt: skip
     starts = [[begin for begin, *_ in solution.phases] for solution in (found, exact)]
     np.testing.assert_allclose(*starts, rtol=0, atol=1e-8)

@@ -124,6 +124,7 @@ def test_processes_starting_together_compile_once(tmp_path):
     assert sum(result["misses"] for result in results) == KERNELS
 
 
+@pytest.mark.slow
 @own
 def test_kernels_without_readable_source_are_stored(package):
     """Generated functions have the lines of a template in another file, which newer versions of Python don't read."""
@@ -163,6 +164,7 @@ print(thrice(1.0), file=__import__("sys").stderr)
 )
 
 
+@pytest.mark.slow
 @own
 def test_a_kernel_under_the_name_of_another_is_compiled_again(tmp_path):
     environment = {"TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}
@@ -177,6 +179,7 @@ def test_a_kernel_under_the_name_of_another_is_compiled_again(tmp_path):
     assert errors.endswith("3.0\n")
 
 
+@pytest.mark.slow
 @own
 def test_a_kernel_whose_module_has_moved_is_compiled_without_a_warning(tmp_path):
     environment = {"TSDYN_CACHE_DIR": str(tmp_path / "kernels")}
@@ -211,6 +214,7 @@ def test_a_kernel_whose_callee_has_moved_is_compiled_without_a_warning(tmp_path)
     assert found == [(6.0, 0, 1, False)] * 2
 
 
+@pytest.mark.slow_for("above")
 @posix
 @pytest.mark.parametrize("which", ["kernels", "above"])
 def test_folders_that_others_can_write_to_are_refused(which, tmp_path):

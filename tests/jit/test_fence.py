@@ -146,6 +146,7 @@ def test_stock_is_asked_for_without_a_warning(tmp_path):
     assert not list(tmp_path.rglob("*.kernel"))
 
 
+@pytest.mark.slow
 def test_a_damaged_file_of_numba_is_told_and_compiled_again(tmp_path):
     environment = {"TSDYN_JIT": "stock", "TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}
     run(TINY, environment)
@@ -164,6 +165,7 @@ def test_an_unknown_way_is_told(tmp_path):
     assert errors.count("TSDYN_JIT=stok is unknown") == 1
 
 
+@pytest.mark.slow
 def test_numba_as_it_comes_is_never_stale(package):
     """Numba alone would answer the edit of a callee in another file with stale code."""
     (package / "tsdyn" / "inner.py").write_text(
@@ -214,6 +216,7 @@ def test_both_ways_give_the_same_bits():
     assert "CompilerWarning" not in errors
 
 
+@pytest.mark.slow_but("backend")
 @pytest.mark.parametrize("file", ["lanes", "simd", "resident", "backend", "stock"])
 def test_an_edit_of_code_generation_names_other_kernels(package, file):
     """Types and their lowering are named by no function."""
@@ -244,6 +247,7 @@ def of_a_type(x):
 """
 
 
+@pytest.mark.slow
 def test_an_edit_beside_a_type_of_a_user_names_other_kernels(tmp_path):
     """Its model is registered beside it."""
     file, environment = tmp_path / "user_types.py", {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
@@ -263,6 +267,7 @@ assert main(["info", "--cache", "--json"]) == 0
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(compilers.current() is stock, reason="Numba's own cache has other files")
 def test_a_kernel_that_cannot_be_loaded_is_told_and_counted(tmp_path):
     environment = {"TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}

@@ -17,6 +17,7 @@ def machine(**environment):
     return found["machine"], errors
 
 
+@pytest.mark.slow
 @own
 @portable
 def test_the_best_portable_target_is_the_default(monkeypatch):
@@ -88,6 +89,7 @@ report(value=call(1000))
 )
 
 
+@pytest.mark.slow_for("ring*")
 @own
 @pytest.mark.parametrize("before", ["", "ring(3), said(3)"])
 def test_users_functions_that_print_or_call_each_other_in_a_ring(tmp_path, before):

@@ -11,9 +11,10 @@ from tests.helpers.reference import load
 from tests.helpers.tolerances import FINE, HELD, NEAR
 from tsdyn.measuring import benchmark as agreement
 from tsdyn.measuring import benchmark as benchmark_report
-from tsdyn.testing.integrator_scenes import sliding_top, two_body_pendulum
+from tsdyn.testing.integrator_scenes import SCENES
 
 I = ts.integrators
+sliding_top, two_body_pendulum = (SCENES[name][0] for name in ("sliding top", "two-body pendulum"))
 SPAN = (0.0, 0.5)
 
 

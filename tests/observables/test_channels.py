@@ -117,6 +117,23 @@ def curve(axes, label):
     return next(line.get_data() for ax in axes for line in ax.lines if line.get_label() == label)
 
 
+def test_a_contact_with_friction_that_closes():
+    """A puck lands, slides to rest, and then carries a side load of 2 N; a demand in flight is zero."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    puck = scene.add_point_mass(MASS, position=(0, 0, 0.2), velocity=(3, 0, 0), name="puck")
+    scene.add(ts.forces.PointForce(puck, force=(0, 2, 0)))
+    law = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.5}
+    scene.add(ts.constraints.PlaneContact(puck, scene.ground, **law, name="ice"))
+    solution = ts.simulate(scene, (0, 1), dense_output=True)
+    times = [0.1, 0.21, 0.9]
+    found = solution.at(times).friction_demand("ice")
+    np.testing.assert_allclose(found, [0, 0.5, 2 / (MASS * G)], rtol=FAIR)
+    table = solution.to_dataframe(channels=["ice.friction_demand", "ice.contact_point"])
+    np.testing.assert_allclose(table.iloc[-1, 0], 2 / (MASS * G), rtol=FAIR)
+    np.testing.assert_array_equal(table.iloc[:, 1:], solution.position("puck"))
+    assert solution.to_dataframe(channels=["ice"]).columns.size == 6  # force and torque
+
+
 @pytest.mark.parametrize("dense", [True, False])
 def test_figures_are_smooth_where_steps_are_few(dense):
     scene = bar_and_bob()

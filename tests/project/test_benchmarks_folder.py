@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from benchmarks import contacts, mechanisms, ours, peers, rolling
+from benchmarks import contacts, ours, peers, rolling
 from benchmarks.by_hand import contenders as by_hand
 from benchmarks.contender import Contender, Outcome, rotation
 from benchmarks.measure import Measured, Row, measure
-from benchmarks.scenes import SCENES
+from benchmarks.scenes import SCENES, of_file
+from examples import top
 from tests.helpers.scenes import constraints
 from tests.helpers.tolerances import EXACT, FINE, HELD, LOOSE, ROUNDING, TIGHT
-from tsdyn.testing.integrator_scenes import sliding_top
+from tsdyn.stress import rods
 
 PEERS = peers.contenders()
 SMALL = ("sliding top", "two-body pendulum", "two-body pendulum in space", "chain of 4", "tree of 7", "loop of 4")
@@ -43,7 +44,7 @@ def test_contacts_end_where_the_references_say():
 
 @pytest.mark.parametrize("links", [4, 16])
 def test_chains_are_those_of_the_reference_files(links):
-    mine, theirs = mechanisms.chain(links), mechanisms.of_file(f"chain_{links}")
+    mine, theirs = rods.chain(links), of_file(f"chain_{links}")
     assert mine["constraints"] == theirs["constraints"]
     assert mine["forces"] == theirs["forces"]
     np.testing.assert_equal(mine["gravity"], theirs["gravity"])
@@ -56,16 +57,16 @@ def test_chains_are_those_of_the_reference_files(links):
 @pytest.mark.parametrize(
     ("definition", "bodies", "rows"),
     [
-        (mechanisms.chain(3), 3, 9),
-        (mechanisms.tree(4), 15, 45),
-        (mechanisms.hub(20), 21, 63),
-        (mechanisms.loop(5), 5, 18),
-        (mechanisms.net(2, 3), 17, 3 * (2 * 17 - 12 + 2)),
+        (rods.chain(3), 3, 9),
+        (rods.tree(4), 15, 45),
+        (rods.hub(20), 21, 63),
+        (rods.loop(5), 5, 18),
+        (rods.net(2, 3), 17, 3 * (2 * 17 - 12 + 2)),
     ],
     ids=["chain", "tree", "hub", "loop", "net"],
 )
 def test_mechanisms_are_consistent_and_of_full_rank(definition, bodies, rows):
-    scene = mechanisms.build(definition)
+    scene = rods.build(definition)
     assert len(scene.bodies) == bodies
     found = scene.evaluate()
     assert found.Phi.size == rows + bodies
@@ -236,7 +237,7 @@ def test_one_command():
 
 def test_rotation_matrices_are_those_of_the_solver():
     p = np.array([[0.5, -0.1, 0.7, 0.4]])
-    scene = sliding_top()
+    scene = top.build()
     body = scene.bodies[0]
     solution = ts.simulate(scene, (0.0, 0.01), integrator="rk45")
     np.testing.assert_allclose(rotation(solution.orientation(body)), solution.rotation(body), atol=EXACT)

@@ -1,5 +1,7 @@
 """Events: by SciPy's rules, at the times of closed forms, and without changing a step."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from tsdyn.observables.diagnostics import constraint_error
 I = ts.integrators
 END = 3.0  # s
 REFERENCE = I.DOP853(1e-13, 1e-13)
+FORMS = ("tangent", "maggi-kane")
 
 
 def event(function, **attributes):
@@ -72,8 +75,10 @@ def test_with_every_method(method, formulation):
     assert times.size == int((END / quarter + 1) / 2)
 
 
-@pytest.mark.parametrize("method", [I.Nystrom4(1e-2), I.RK45(1e-6, 1e-6), I.DOP853(1e-6, 1e-6)])
-@pytest.mark.parametrize("formulation", ["tangent", "maggi-kane"])
+@pytest.mark.parametrize(
+    ("method", "formulation"),
+    [(I.Taylor(1e-8), "tangent"), *product((I.Nystrom4(1e-2), I.RK45(1e-6, 1e-6), I.DOP853(1e-6, 1e-6)), FORMS)],
+)
 @pytest.mark.parametrize("t_eval", [None, np.linspace(0.0, END, 31)])
 def test_events_change_no_step(method, formulation, t_eval):
     plain = run(None, method, formulation=formulation, t_eval=t_eval)

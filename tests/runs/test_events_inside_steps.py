@@ -94,14 +94,6 @@ def test_random_polynomials_and_angles_change_sign_as_often_as_samples_do(rng):
         assert (times.size - np.count_nonzero(signs[1:] != signs[:-1])) % 2 == 0
 
 
-def test_events_change_no_step():
-    scene = point_pendulum()[0]
-    plain = ts.simulate(scene, (0.0, 5.0))
-    watched = ts.simulate(scene, (0.0, 5.0), events=[hum(), lambda t, state: state.q[0]])
-    for one, two in zip((*plain.steps, plain.q, plain.qd), (*watched.steps, watched.q, watched.qd), strict=True):
-        np.testing.assert_array_equal(one, two)
-
-
 # grazing
 
 

@@ -205,6 +205,7 @@ def noise(t, state):
     return (1e-3 * (x - math.floor(x)), 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_noise_costs_no_more_steps_than_there_are_samples():
     found = run(mass(noise), "rk45", rtol=1e-3, atol=1e-3)
     assert found.stats.steps + found.stats.rejected < 6000

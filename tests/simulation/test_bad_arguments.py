@@ -225,19 +225,6 @@ def test_results_of_what_is_no_constraint_of_the_scene():
         )
 
 
-def test_results_stay_what_they_were_when_the_scene_goes_on():
-    w, twin = build(), build()
-    solution, expected = run(max_steps=3)(w), run(max_steps=3)(twin)
-    w.rod.mass = 7.0
-    w.scene.gravity = (0.0, 0.0, 0.0)
-    w.scene.add(C.Distance(w.rod, w.bead, length=9.0, name="late"))
-    w.scene.add_body(1.0, (1.0, 1.0, 1.0), name="late")
-    np.testing.assert_array_equal(solution.energy, expected.energy)
-    np.testing.assert_array_equal(solution.multipliers, expected.multipliers)
-    np.testing.assert_array_equal(solution.reaction(w.pivot), expected.reaction(twin.pivot))
-    np.testing.assert_array_equal(solution.constraint_error, expected.constraint_error)
-
-
 def test_a_tolerance_may_be_an_array_of_no_dimension():
     w = build()
     given, expected = (ts.simulate(w.scene, (0.0, 0.1), rtol=tol, atol=tol) for tol in (np.array(1e-5), 1e-5))
@@ -264,15 +251,6 @@ def test_a_tolerance_may_be_an_array_of_no_dimension():
 def test_wrong_calls_of_public_classes(call, words):
     with pytest.raises(ts.InvalidCall, match=re.escape(words)):
         call()
-
-
-METHODS = [name for name, value in vars(ts.Scene).items() if callable(value) and not name.startswith("_")]
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_methods_of_scenes_refuse_unknown_arguments_by_their_name(name):
-    with pytest.raises(ts.InvalidCall, match=rf"Scene\.{name}\(\) has no argument pointt"):
-        getattr(ts.Scene(), name)(pointt=3)
 
 
 def test_a_state_to_start_from_needs_no_accelerations():

@@ -1,15 +1,14 @@
 """Calls one after the other, side by side and one inside another: the memory that they share shows in no result."""
 
 import gc
-import pickle
 import tracemalloc
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 import tsdyn as ts
 from examples import driven_pivot, top
+from tests.helpers.calls import PARTS, same_run
 from tests.helpers.scenes import build as build_scene
 from tests.helpers.scenes import random_chain
 from tsdyn.configuration.initial_conditions import StartWorkspace
@@ -21,7 +20,6 @@ from tsdyn.taylor.series_engine import SeriesEngine
 
 I = ts.integrators
 SPAN = (0.0, 0.3)
-PARTS = ("t", "q", "qd", "qdd", "multipliers")
 WAYS = {
     "default": {},
     "tight": {"rtol": 1e-11, "atol": 1e-11},
@@ -52,22 +50,13 @@ def run(scene, way):
     return ts.simulate(scene, SPAN, **WAYS[way])
 
 
-def same(one, two):
-    counts = [{**vars(each.stats), "seconds": None} for each in (one, two)]
-    assert counts[0] == counts[1]
-    assert (one.status, one.message) == (two.status, two.message)
-    arrays = [(*(getattr(each, x) for x in PARTS), *each.steps, *each.charts, *each.state) for each in (one, two)]
-    for a, b in zip(*arrays, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
 @pytest.mark.slow_for("*top", "*driven")
 @pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
 def test_a_run_is_the_same_whatever_ran_before(make, ways, rng):
     first = {way: run(make(), way) for way in ways}
     scene = make()
     for way in rng.permutation(ways * 3):
-        same(run(scene, way), first[way])
+        same_run(run(scene, way), first[way])
 
 
 @pytest.mark.slow
@@ -80,28 +69,9 @@ def test_a_result_is_not_at_the_mercy_of_later_runs():
         run(scene, way)
     for name, value in kept.items():
         np.testing.assert_array_equal(getattr(one, name), value, err_msg=name)
-    same(other, one)
+    same_run(other, one)
     for a, b in zip(before, one.at(0.2), strict=True):
         np.testing.assert_array_equal(a, b)
-
-
-def test_a_result_may_be_written_to():
-    scene = top.build()
-    expected, spoilt = run(scene, "outputs"), run(scene, "outputs")
-    for array in (spoilt.t, spoilt.q, spoilt.qd, spoilt.qdd, *spoilt.steps[:2], *spoilt.state[1:]):
-        array[:] = np.nan
-    same(run(scene, "outputs"), expected)
-
-
-def test_arguments_are_checked_once_by_value_and_type():
-    scene = top.build()
-    good = {"dense_output": True, "max_steps": 1, "rtol": 1e-6, "constraint_tol": 1e-12}
-    ts.simulate(scene, SPAN, **good)
-    for wrong in ({"dense_output": 1}, {"max_steps": True}, {"max_steps": 1.0}, {"rtol": [1e-6]}, {"redundancy": []}):
-        for _ in range(2):
-            with pytest.raises(ts.InvalidArgument, match=next(iter(wrong))):
-                ts.simulate(scene, SPAN, **{**good, **wrong})
-    assert ts.simulate(scene, SPAN, **good).stats.steps == 1
 
 
 def test_a_method_is_taken_as_it_is_now():
@@ -110,7 +80,7 @@ def test_a_method_is_taken_as_it_is_now():
         loose = ts.simulate(scene, SPAN, integrator=method)
         setattr(method, name, value)
         found = ts.simulate(scene, SPAN, integrator=method)
-        same(found, ts.simulate(top.build(), SPAN, integrator=method))
+        same_run(found, ts.simulate(top.build(), SPAN, integrator=method))
         assert found.stats.steps != loose.stats.steps or name == "rtol"
         assert found.method == repr(method)
 
@@ -138,15 +108,10 @@ def test_a_repeated_call_lays_nothing_out(monkeypatch):
     for kind in (SeriesEngine, StepEngine, StartWorkspace, Memory):
         monkeypatch.setattr(kind, "__init__", lambda self, *a, init=kind.__init__: made.append(self) or init(self, *a))
     for way, each in zip(ways, first, strict=True):
-        same(run(scene, way), each)
+        same_run(run(scene, way), each)
     for state, each in zip(states, again, strict=True):
-        same(ts.simulate(scene, SPAN, state=state), each)
+        same_run(ts.simulate(scene, SPAN, state=state), each)
     assert not made
-
-
-def test_a_result_is_complete_when_it_is_pickled():
-    one = run(top.build(), "outputs")
-    same(pickle.loads(pickle.dumps(one)), one)
 
 
 def test_what_a_run_said_does_not_follow_the_scene():
@@ -171,28 +136,7 @@ def test_runs_inside_a_run():
     np.testing.assert_array_equal(outer.q, expected.q)
     assert len(inner) > 2
     for each in inner:
-        same(each, expected)
-
-
-def test_runs_in_threads_on_one_scene(ways):
-    scene = top.build()
-    expected = {way: run(scene, way) for way in ways}
-    jobs = ways * 4
-    with ThreadPoolExecutor(4) as pool:
-        for way, each in zip(jobs, pool.map(lambda way: run(scene, way), jobs), strict=True):
-            same(each, expected[way])
-
-
-def test_an_edited_scene_sees_the_edit(ways):
-    scene = top.build()
-    for mass in (30.0, 31.0, 30.0):
-        scene.bodies[0].mass = mass
-        fresh = top.build()
-        fresh.bodies[0].mass = mass
-        for way in ways:
-            same(run(scene, way), run(fresh, way))
-    scene.add_point_mass(1.0)
-    assert run(scene, "charts").q.shape[1] == 10
+        same_run(each, expected)
 
 
 def test_a_start_is_looked_at_once_and_again_when_it_changes(monkeypatch):
@@ -253,7 +197,7 @@ def test_a_large_memory_is_not_kept(monkeypatch):
     monkeypatch.setattr(prepare, "LARGEST", 1000)
     scene = top.build()
     expected = run(top.build(), "default")
-    same(run(scene, "default"), expected)
+    same_run(run(scene, "default"), expected)
     assert not any(spare for kinds in scene._spare.values() for spare in kinds.values())
 
 
@@ -263,7 +207,7 @@ def test_room_for_charts_is_made_as_they_come(monkeypatch):
     for module in (driver, run_log):
         monkeypatch.setattr(module, "CHART_ROOM", 4)
     for way, each in expected.items():
-        same(run(top.build(), way), each)
+        same_run(run(top.build(), way), each)
 
 
 def test_a_run_of_many_charts_ends_in_its_first_slice(monkeypatch):

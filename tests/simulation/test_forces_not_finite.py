@@ -83,6 +83,7 @@ MADE = {
 }
 
 
+@pytest.mark.slow_for("of two states")
 @pytest.mark.parametrize("made", MADE)
 def test_exceptions_of_functions_are_told(made):
     solution = ts.simulate(MADE[made](), (0, 1))

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from benchmarks import mechanisms
 from examples import geared_pair, top
 from tests.helpers.methods import one_of_each
 from tsdyn.files import archive as archives
 from tsdyn.model import packed
 from tsdyn.runs import dense_output, driver, run_memory
+from tsdyn.stress import rods as mechanisms
 
 OUTPUTS = ("t", "q", "qd", "qdd")
 METHODS = one_of_each(1e-9, 1e-2) | {"rk45, maggi-kane": {"integrator": "rk45", "formulation": "maggi-kane"}}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from benchmarks import mechanisms
+from tests.helpers import driven
 from tests.helpers.constraint_levels import check
 from tests.helpers.scenes import random_body, random_primitive
 from tests.helpers.tolerances import CLOSE, COARSE, FAIR, FINE, TIGHT
@@ -18,6 +18,7 @@ from tsdyn.observables.diagnostics import constraint_rows
 from tsdyn.observables.evaluate import constraint_arrays
 from tsdyn.rows import constraint_graph as hubs
 from tsdyn.simulation.scene_cache import prepared
+from tsdyn.stress import rods as mechanisms
 from tsdyn.taylor import layout as expansion_pack
 
 C = ts.constraints
@@ -141,12 +142,13 @@ def test_rows_that_depend_on_each_other_at_a_hub(large, monkeypatch):
 
 
 @pytest.mark.slow
-def test_series_that_are_far_from_the_processor(monkeypatch):
+@pytest.mark.parametrize("build", [lambda: wheel(20), driven.everything], ids=["wheel", "driven"])
+def test_series_that_are_far_from_the_processor(build, monkeypatch):
     """What is brought into the cache ahead of its use changes no number."""
     runs = []
     for limit in (expansion_pack.FAR, 0):
         monkeypatch.setattr(expansion_pack, "FAR", limit)
-        runs.append(ts.simulate(wheel(20), (0.0, 0.5)).raise_if_failed())
+        runs.append(ts.simulate(build(), (0.0, 0.5)).raise_if_failed())
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
 
 

@@ -200,10 +200,10 @@ def test_sets_of_contacts_between_the_same_bodies_share_a_graph(monkeypatch):
     """As many corners of a box at a time are one graph with other points; the run has the bits of separate ones."""
     built, graph = [], constraint_graph._GraphBuilder.graph
     monkeypatch.setattr(constraint_graph._GraphBuilder, "graph", lambda self: built.append(self) or graph(self))
-    shared = ts.simulate(stack(2), (0, 0.4))
+    shared = ts.simulate(stack(3), (0, 0.4))
     sets, graphs = len(shared._phases.packed), len(built)
     monkeypatch.setattr(phase_scenes, "_takes_over", lambda packed, first: False)
-    alone = ts.simulate(stack(2), (0, 0.4))
+    alone = ts.simulate(stack(3), (0, 0.4))
     assert len(built) - graphs >= sets > graphs > 1
     for name in ("t", "q", "qd", "qdd", "multipliers"):
         np.testing.assert_array_equal(getattr(shared, name), getattr(alone, name))

@@ -120,6 +120,8 @@ EDITS = {
     "mass": lambda scene: setattr(scene.body("top"), "mass", 31.0),
     "gravity": lambda scene: setattr(scene, "gravity", (0.0, 0.5, -9.6)),
     "position": lambda scene: setattr(scene.body("top"), "position", (0.5, 0.0, 1.0)),
+    "inertia": lambda scene: setattr(scene.body("top"), "inertia", (91.0, 89.0, 31.0)),
+    "velocity": lambda scene: setattr(scene.body("top"), "velocity", (0.2, -0.1, 0.0)),
     "spin": lambda scene: setattr(scene.body("top"), "angular_velocity", (0.5, 0.0, 11.0)),
     "name": lambda scene: setattr(scene.body("top"), "name", "spinner"),
     "body": lambda scene: scene.add_point_mass(1.0, name="stone"),

@@ -37,6 +37,7 @@ def slowing(bearing=0.3):
     return drag * G / np.sqrt(mass**2 - drag**2)
 
 
+@pytest.mark.slow_for("*null-space*")
 @pytest.mark.parametrize("given", [{}, {"formulation": "null-space"}], ids=str)
 def test_a_wheel_with_a_rough_axle_rolls_to_rest(given):
     solution = ts.simulate(cart(), (0, 12), rtol=1e-13, atol=1e-13, **given)

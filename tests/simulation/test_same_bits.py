@@ -1,9 +1,12 @@
 """A scene gives the same bits in every process, whatever ran before."""
 
+import os
 import subprocess
 import sys
 
 import pytest
+
+from tsdyn.stress.campaign import BLAS_THREADS
 
 CODE = """
 import hashlib, sys
@@ -41,3 +44,26 @@ def test_every_process_and_order(methods):
     ]
     assert found[0] == found[1]
     assert found[0].count("(") == 3 * len(methods.split(",")) * 2
+
+
+TOWER = """
+import hashlib
+import tsdyn as ts
+from tests.simulation.test_many_contacts import stack
+
+solution = ts.simulate(stack(10, rough=True), (0.0, 0.22), rtol=1e-10, atol=1e-10)
+print(len(solution.t), hashlib.sha256(solution.q.tobytes() + solution.multipliers.tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_many_contacts_whatever_the_threads_of_linear_algebra():
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", TOWER], env={**os.environ, **dict.fromkeys(BLAS_THREADS, threads)},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for threads in ("1", "2")
+    }  # fmt: skip
+    assert len(found) == 1
+    assert int(found.pop().split()[0]) > 1000

@@ -70,6 +70,7 @@ LOADS = {
     "body": lambda a, b: F.PointForce(a, force=three, frame="body", point_a=(0.5, 0, 0)),
     "user": lambda a, b: F.UserForce(a, b, function=drag, parameters=(0.2, 0.1), point_a=(0.5, 0, 0)),
     "arrays": lambda a, b: F.UserForce(a, b, function=tether, parameters=(20.0,), point_b=(0, 0, 3)),
+    "friction": lambda a, b: F.CoulombFriction(a, b, torque=0.5, slip_rate=0.1),
     "state": lambda a, b: F.PointForce(a, force=cubic),
     "state, body": lambda a, b: F.PointForce(a, force=cubic, frame="body"),
     "state, torque": lambda a, b: F.Torque(a, torque=cubic),

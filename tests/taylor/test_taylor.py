@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.closed_loops import bricard
+from benchmarks.stiff import mounted
 from tests.helpers.reference import demand_on_the_manifold, error, load
 from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, NEAR, ROUNDING, TIGHT
 from tsdyn.runs import driver
@@ -191,28 +191,6 @@ def test_the_default_is_taylor_where_everything_has_a_series():
     assert ts.simulate(scene, (0.0, 0.1)).method.startswith("Taylor")
 
 
-@pytest.mark.slow
-def test_a_stiff_motion_is_handed_to_an_implicit_method():
-    scene = ts.Scene()
-    arm = scene.add_body(
-        mass=1.0, inertia=(0.1, 0.1, 0.02), position=(0.0, 0.0, -0.5), angular_velocity=(0.5, 0.0, 0.0)
-    )
-    scene.add(F.Bushing(arm, scene.ground, point_a=(0.0, 0.0, 0.5), stiffness=1e8, damping=1e5))
-    solution = ts.simulate(scene, (0.0, 1.0), rtol=1e-4, atol=1e-4)
-    assert solution.method.startswith("Radau")
-    solution.raise_if_failed()
-
-
-@pytest.mark.parametrize("tol", [1e-13, 1e-15])
-def test_the_energy_error_at_the_limit_of_rounding_is_a_random_walk(tol):
-    """Errors of one sign reach 59 eps sqrt(steps) here; of either sign, about one."""
-    solution = ts.simulate(bricard(), (0.0, 300.0), integrator=I.Taylor(tol))
-    size = solution.kinetic_energy.max() + np.abs(solution.potential_energy).max()
-    error = np.abs(solution.energy - solution.energy[0]) / size
-    assert solution.stats.steps > 2000
-    assert error.max() < 4.0 * EPS * np.sqrt(solution.stats.steps)
-
-
 def test_steps_follow_the_tolerance_down_to_the_limit_of_rounding():
     """1e-15 is finer than 1e-13; from 1e-12 up a step is held to a thousandth."""
     steps = [
@@ -259,22 +237,9 @@ def test_residuals_of_positions_do_not_walk():
     assert np.median(windows, axis=1).max() < 7.0 * EPS
 
 
-def mounted(stiffness, count=2):
-    """Blocks in a row on overdamped bushings, pushed."""
-    scene = ts.Scene()
-    law = {"stiffness": stiffness, "damping": 0.01 * stiffness}
-    law |= {f"torsional_{name}": value for name, value in law.items()}
-    before, point = scene.ground, (0.0, 0.0, 0.0)
-    for i in range(count):
-        block = scene.add_body(1.0, (0.01, 0.02, 0.02), (0.3 * (i + 0.5), 0.0, 0.0), velocity=(0.0, 0.5, 0.0))
-        scene.add(F.Bushing(before, block, point_a=point, point_b=(-0.15, 0.0, 0.0), **law))
-        before, point = block, (0.15, 0.0, 0.0)
-    return scene
-
-
 def test_velocities_of_fast_modes_are_held_too():
     """Rates of 1e8 1/s: errors of places within the tolerance were velocities of metres a second."""
-    scene, span = mounted(1e8), (0.0, 2e-6)
+    scene, span = mounted(1e8, count=2), (0.0, 2e-6)
     demanded = ts.simulate(scene, span, integrator=I.DOP853(1e-12, 1e-12), t_eval=span).state
     state = ts.simulate(scene, span, integrator=I.Taylor(1e-6), t_eval=span).state
     np.testing.assert_allclose(state.qd, demanded.qd, rtol=0.0, atol=1e-4)
@@ -290,7 +255,7 @@ def test_an_implicit_method_is_considered_again_at_times_of_the_motion_alone(sli
     monkeypatch.setattr(
         segments.Turns, "_to_implicit", lambda self, *given: asked.append(given[1]) or own(self, *given)
     )
-    ts.simulate(mounted(1e6), (0.0, 1.0), rtol=1e-6, atol=1e-6, max_steps=3000)
+    ts.simulate(mounted(1e6, count=2), (0.0, 1.0), rtol=1e-6, atol=1e-6, max_steps=3000)
     assert len(asked) == 5
     assert [later / before for before, later in pairwise(asked)] == [4.0, 4.0, 4.0, 4.0]
 
@@ -298,7 +263,7 @@ def test_an_implicit_method_is_considered_again_at_times_of_the_motion_alone(sli
 @pytest.mark.slow
 @pytest.mark.parametrize("tol", [1e-4, 1e-10])
 def test_an_implicit_method_takes_over_when_its_steps_have_grown(tol):
-    solution = ts.simulate(mounted(1e8), (0.0, 1.0), rtol=tol, atol=tol)
+    solution = ts.simulate(mounted(1e8, count=2), (0.0, 1.0), rtol=tol, atol=tol)
     assert solution.method.startswith("Radau")
     assert solution.stats.steps < 2000
 

@@ -10,14 +10,19 @@ joints tie slips to rates of gaps: coefficients of restitution are lowered toget
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ..maths.complementarity import OPEN, STICKS, solve_cone
-from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
+from ..maths.dense_solve import least_squares, product, solve
+from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import AHEAD, EVENT_ERROR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
+
+# Of `shared`: weights of the margin, most steps at each, the gain that ends them, shares of the largest reaction
+PATH, STEPS, SETTLED, MARGIN = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6), 30, 1e-9, 0.1
 
 
 def rows_of(inertia, which):
@@ -37,7 +42,7 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
     """The `Struck` of an impact of the gaps `which`; rates (k,) before, restitution (k,). Raises NoSolution."""
     rows = rows_of(inertia, which)
     response = inertia.free(rows.T)
-    G, mu, rounding = rows @ response, inertia.gaps.kinetic[which], SUM_ROUNDING * inertia.sizes(qd).max()
+    G, mu, rounding = product(rows, response), inertia.gaps.kinetic[which], SUM_ROUNDING * inertia.sizes(qd).max()
     before = np.column_stack([rates, inertia.slips(qd)[which]]).ravel()
     normal = np.arange(0, before.size, 3)
 
@@ -154,7 +159,10 @@ def _alone(inertia, found, qd, fired):
     which, seen, small = found.closed, [], LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
     while which not in seen:
         seen.append(which)
-        again, pulls = _solve(inertia, which, qd, fired)
+        try:
+            again, pulls = _solve(inertia, which, qd, fired)
+        except NoSolution:
+            return None
         left = {*found.closed, *found.idle}.difference(again.closed, again.idle)
         low = sorted(i for i in left if again.accelerations[i] <= small[i])
         idle = [i for i in low if depends(inertia, again.closed, i)]
@@ -228,13 +236,13 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd)
     response = inertia.free(cones.rows.T)
-    G, c, terms = cones.rows @ response, cones.open, cones.terms
+    G, c, terms = product(cones.rows, response), cones.open, cones.terms
     b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
     p, mode, mu = cones.solve(G, b)
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
-    small, carried = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p)), inertia.carried()
+    small, carried = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)), inertia.carried()
     mode = _sharing(G, b, p, mode, cones, response)
     moves, sizes = ((A @ x + y).reshape(-1, 3)[:, 1:] for A, x, y in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
     closed, idle, spare, grips, begun = [], [], [], {}, {}
@@ -249,14 +257,17 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
         else:
             (idle if depends(inertia, closed, i) else closed).append(i)
         if gaps.rough[i]:
-            length = np.hypot(*T[j])
+            # What neither opens nor pushes has no friction: it slides, or sticks where its slip has no acceleration
+            held = pushes and mu[j] > 0.0
+            way, rounding = (-T[j], 0.0) if held else (moves[j], 0.0 if pushes else LEVEL * sizes[j].max())
+            length = np.hypot(*way)
             if slides[j]:
                 grips[i] = inertia.along(i, d[j])
-            elif mode[j] == STICKS or not pushes or not length > 0.0:
+            elif (pushes and mode[j] == STICKS) or not length > rounding:
                 grips[i] = None
             else:
-                grips[i] = inertia.along(i, -T[j] / length)
-                gain = -moves[j] @ T[j] / length
+                grips[i] = inertia.along(i, way / length)
+                gain = moves[j] @ way / length
                 begun |= {i: float(gain)} if gain > EVENT_ERROR * sizes[j].max() else {}
     alone = dict(zip(resting, b.reshape(-1, 3), strict=True))
     if by_rows:
@@ -273,7 +284,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
 
 
 def _sharing(G, b, p, mode, cones, response):
-    """Modes (k,) in which all contacts stick that don't accelerate, if friction in proportion to its bounds is within.
+    """Modes (k,) in which all contacts stick that don't accelerate, if the same reactions can be within their bounds.
 
     Where slips depend on each other, the solution may have some at their bounds that others could relieve.
     """
@@ -281,11 +292,9 @@ def _sharing(G, b, p, mode, cones, response):
     still = cones.rough & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= LEVEL * terms).all(axis=1)
     if (mode[still] == STICKS).all():
         return mode
-    loads = p.reshape(-1, 3)[still]
-    slips = response.T.reshape(-1, 3, response.shape[0])[still, 1:]
-    bounds = cones.static[still] * loads[:, 0]
-    T = spread(bounds[None], slips[None], loads[None, :, 1:])[0]
-    within = np.hypot(*T.T) < (1.0 - EVENT_ERROR) * bounds
+    loads = response.T[np.repeat(still, 3)]
+    N, *T = shared(cones.static[still], loads, p.reshape(-1, 3)[still]).T
+    within = np.hypot(*T) < (1.0 - EVENT_ERROR) * cones.static[still] * N
     return np.where(still, STICKS, mode) if within.all() else mode
 
 
@@ -383,8 +392,8 @@ def halted(inertia, qd, resting, which):
     tangents = inertia.tangents[held].reshape(2 * len(held), -1)
     response = inertia.free(np.concatenate([loads, tangents]).T)
     left = np.concatenate([np.zeros(len(resting)), tangents @ qd])
-    G = np.concatenate([inertia.J[resting], tangents]) @ response
-    p = np.linalg.lstsq(G, left, rcond=RANK_TOL**2)[0]
+    G = product(np.concatenate([inertia.J[resting], tangents]), response)
+    p = least_squares(G, left, RANK_TOL**2)
     after = qd - response @ p
     friction = np.concatenate([loads - inertia.J[resting], tangents])
     return after, -0.5 * float(p @ (friction @ (qd + after)))
@@ -426,8 +435,13 @@ def _held(inertia, closed, grips, b, small):
     reactions are those, or what one contact alone would carry of the terms: in free fall all reactions are rounding.
     """
     (A, a), k = _holding(inertia, closed, grips, b), len(closed)
-    by = np.linalg.pinv(A, rcond=RANK_TOL**2)[:k]
-    pushes = -by @ a
+    by = least_squares(A, np.eye(len(A)), RANK_TOL**2)
+    p, by = -by @ a, by[:k]
+    pushes, sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
+    if sticks:
+        at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
+        loads = inertia.free(rows_of(inertia, sticks).T).T
+        pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
     return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
@@ -439,21 +453,88 @@ def _holding(inertia, closed, grips, b):
     slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
     loads = np.concatenate([_loads(inertia, closed, _ways(inertia, grips)), slips])
     rows = np.concatenate([inertia.J[closed], slips])
-    return rows @ inertia.free(loads.T), np.array([*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])])
+    return product(rows, inertia.free(loads.T)), np.array(
+        [*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])]
+    )
 
 
-def spread(bounds, responses, T):
-    """The same friction (k, c, 2) of c contacts at k states in proportion to its bounds (k, c) where rows depend.
+def shared(static, loads, p):
+    """The same reactions p (c, 3) of contacts that stick, shared among them: as deep in their cones as they can.
 
-    responses (k, c, 2, n): accelerations by unit friction. The least sum of |T|^2 / (mu N) with the same accelerations:
-    a box on a plane that doesn't turn has T / (mu N) alike at all corners.
+    loads (3 c, n): accelerations by unit reactions. Where slips depend on each other alone, friction is in proportion
+    to its bounds. Where they depend on gaps, contacts brace each other, as those of a ball with floor and wall along
+    the line through both points; on the central path of the cone program
+
+        max t,  N - t >= |T| / mu,  t <= m:      min -w t - log(m - t) - sum log((N - t)^2 - |T|^2 / mu^2) + |p|^2 / 2
+
+    (Boyd and Vandenberghe, 2004, chapter 11) reactions are smooth, and differ from its end by some c / w, which two
+    weights w take away. So they are within their cones as long as any are. The squares bound them where contacts jam.
     """
-    k, c = bounds.shape
-    weight = np.repeat(np.sqrt(np.maximum(bounds, 0.0)), 2, axis=1)
-    rows = responses.reshape(k, 2 * c, -1)
-    loads = np.einsum("kr,krn->kn", T.reshape(k, 2 * c), rows)
-    found = [
-        w * np.linalg.lstsq((w[:, None] * A).T, load, rcond=RANK_TOL)[0]
-        for w, A, load in zip(weight, rows, loads, strict=True)
-    ]
-    return np.array(found).reshape(k, c, 2)
+    size, free = np.abs(p).max(initial=0.0), _null_space(loads.T)
+    if not size > 0.0 or not free.size:
+        return p
+    if np.abs(free[::3]).max() <= RANK_TOL:
+        return _in_proportion(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p)
+    k, x = free.shape[1], p.ravel() / size
+    least = x - free @ (free.T @ x)
+    # u = u0 + B y, in units in which all cones are u_0 > |(u_1, u_2)|; y: shares of `free`, then t
+    scale = np.column_stack([np.ones(len(p)), 1.0 / static, 1.0 / static])
+    B = np.concatenate([free, np.tile([-1.0, 0.0, 0.0], len(p))[:, None]], axis=1).reshape(len(p), 3, k + 1)
+    B, start, metric = scale[:, :, None] * B, scale * least.reshape(-1, 3), np.array([1.0, -1.0, -1.0])
+    y, squares = np.zeros(k + 1), np.append(np.ones(k), 0.0)
+    most = MARGIN * np.abs(least).max()
+    y[k] = min((start[:, 0] - np.hypot(*start[:, 1:].T)).min(), most) - 1.0
+
+    def value(y, weight):
+        u = start + B @ y
+        left, rest = u * u @ metric, most - y[k]
+        if not ((left > 0.0).all() and (u[:, 0] > 0.0).all() and rest > 0.0):
+            return np.inf
+        return 0.5 * squares @ (y * y) - weight * y[k] - np.log(left).sum() - math.log(rest)
+
+    for weight in PATH:
+        before, now = y, value(y, weight)
+        for _ in range(STEPS):
+            u = start + B @ y
+            share, rest = 2.0 / (u * u @ metric), 1.0 / (most - y[k])
+            way = np.einsum("c,ci,cik->ck", share, metric * u, B)
+            slope = squares * y - way.sum(axis=0)
+            slope[k] += rest - weight
+            H = np.diag(squares) + way.T @ way - np.einsum("c,i,cij,cik->jk", share, metric, B, B)
+            H[k, k] += rest * rest
+            step, h = -solve(H, slope), 1.0
+            gain = -slope @ step
+            while (found := value(y + h * step, weight)) > now - 0.1 * h * gain and h > EVENT_ERROR:
+                h *= 0.5
+            y, now = y + h * step, found
+            if gain < SETTLED:
+                break
+    end = y + (y - before) / (PATH[-1] / PATH[-2] - 1.0)
+    return size * (least + free @ end[:k]).reshape(-1, 3)
+
+
+def _null_space(A):
+    """An orthonormal basis (n, k) of the x (n,) with A x = 0, but for columns without a size, which others hold.
+
+    P = I - A^+ A = B B^T by Cholesky's factorisation with pivots, which are one at first: so B^T B = I.
+    """
+    sizes = np.sqrt((A * A).sum(axis=0))
+    held = sizes <= RANK_TOL * sizes.max(initial=0.0)
+    P, B = np.eye(len(sizes)) - least_squares(A, A, RANK_TOL), []
+    P[held], P[:, held] = 0.0, 0.0
+    while len(P) and P.diagonal().max() > HALF_DIGITS:
+        i = P.diagonal().argmax()
+        B.append(P[i] / np.sqrt(P[i, i]))
+        P = P - np.outer(B[-1], B[-1])
+    return np.array(B).reshape(-1, len(P)).T
+
+
+def _in_proportion(bounds, slips, p):
+    """The same reactions p (c, 3) with friction in proportion to its bounds (c,) where rows depend.
+
+    slips (c, 2, n): accelerations by unit friction. The least sum of |T|^2 / (mu N) with the same accelerations: a box
+    on a plane that doesn't turn has T / (mu N) alike at all corners.
+    """
+    weight, rows = np.repeat(np.sqrt(np.maximum(bounds, 0.0)), 2), slips.reshape(2 * len(p), -1)
+    T = weight * least_squares((weight[:, None] * rows).T, p[:, 1:].ravel() @ rows, RANK_TOL)
+    return np.column_stack([p[:, 0], T.reshape(-1, 2)])

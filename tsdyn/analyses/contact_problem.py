@@ -17,12 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
-from ..elements.bodies import turning
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
+from ..maths.dense_solve import least_squares, product
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
 from ..model.handles import all_angles, counted, displacement, first_rows, handles_of, index_of
 from ..model.handles import angle as angle_of
+from ..model.packed import reach_of
 from .contact_rows import ContactWorkspace, Stops
 from .tolerances import LEVEL
 
@@ -91,7 +92,7 @@ class Gaps:
             body, self._ways_sign[i] = (part.a, 1.0) if part.a.dimension else (part.b, -1.0)
             self._ways[i] = packed.system.bodies[index_of(packed, body), 0]
         handles, bodies = handles_of(packed), packed.system.bodies
-        self._places = ~turning(bodies, int(bodies[:, 1].sum()))
+        self._places, self._reach = bodies[:, :1] + np.arange(3), reach_of(packed)
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         stops = [(i, gap.side) for i, gap in enumerate(self.list) if gap.side.joint]
         self._stops, self._bounds = [i for i, _ in stops], np.array([side.bound for _, side in stops])
@@ -102,8 +103,9 @@ class Gaps:
         self._lengths = None, None  # a length, and `lengths` of it
 
     def extent(self, q):
-        """The scene's length at q (n,), m: the largest number of a point or a position."""
-        return max(self.packed.size, float(np.abs(q[self._places]).max(initial=0.0)))
+        """The scene's length at q (n,), m: of points and positions the one farthest off; where there is none, one."""
+        length = max(self._reach, float(np.linalg.norm(q[self._places], axis=1).max(initial=0.0)))
+        return length if length > NEGLIGIBLE * self.packed.size else self.packed.size
 
     def lengths(self, length):
         """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound.
@@ -169,10 +171,14 @@ class Gaps:
             found[k] = J @ qd[k] + drift[which]
         return self.sign[which] * found
 
+    def normals(self, t, q, which):
+        """Rows (k, n) of the gaps `which`."""
+        return self.sign[which, None] * self.workspace.rows(t, q, np.array(which))[0]
+
     def responses(self, t, q, memory, which):
-        """Accelerations (k, 2, n) by unit friction of these gaps, with all gaps open."""
-        rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
-        return self.workspace.respond(t, q, memory, rows).reshape(len(which), 2, -1)
+        """Accelerations (k, 3, n) by unit reactions of these gaps, normal and along both slips, with all gaps open."""
+        rows = np.concatenate([self.normals(t, q, which)[:, None], self.slopes(t, q, which)], axis=1)
+        return self.workspace.respond(t, q, memory, rows.reshape(3 * len(which), -1)).reshape(len(which), 3, -1)
 
     def biases(self, gamma):
         """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""
@@ -249,7 +255,7 @@ class Inertia:
         self.J, self.response, self.G = (np.zeros((gaps.count, size)) for size in (q.size, q.size, gaps.count))
         response = gaps.workspace.respond(t, q, slots, self._rows)
         self.J[self.which], self.response[self.which] = self._rows, response  # M~ J^T, transposed
-        self.G[self.which[:, None], self.which] = self._rows @ response.T
+        self.G[self.which[:, None], self.which] = product(self._rows, response.T)
         self._sizes, self.tangents = np.abs(self._rows), np.zeros((gaps.count, 2, q.size))
         self._more = 0.0 if loads is None else self.free(loads)
         frictional = self.which[gaps.rough[self.which]]
@@ -286,7 +292,7 @@ class Inertia:
 
     def hold(self, which, rates):
         """Impulses (k,) that take these rates from these gaps; negative ones pull."""
-        return -np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
+        return -least_squares(self.among(which), rates, RANK_TOL**2)
 
     def slips(self, qd):
         """Velocities (count, 2) of the slips, zero where they are rounding."""
@@ -442,6 +448,6 @@ def depends(inertia, closed, i, sticks=()):
     if len(sticks):
         slips = inertia.tangents[sticks].reshape(2 * len(sticks), -1)
         rows, loads = np.concatenate([rows, slips]), np.concatenate([loads, inertia.free(slips.T).T])
-    share = np.linalg.lstsq(rows @ loads.T, rows @ own, rcond=RANK_TOL**2 if len(sticks) else None)[0]
+    share = least_squares(product(rows, loads.T), rows @ own, RANK_TOL**2)
     left = own - share @ loads
     return bool(np.linalg.norm(left) <= RANK_TOL * np.linalg.norm(own))

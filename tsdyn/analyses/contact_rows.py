@@ -18,6 +18,7 @@ from ..formulations.tolerances import EXACT, REFINEMENTS
 from ..jit.kernels import ANY, Record, callback, caller, entry, kernel, loader, matrix, resident, vector
 from ..maths.complementarity import CONES
 from ..maths.dense_linalg import copy, largest
+from ..maths.dense_solve import KERNELS as EQUATIONS
 from ..maths.root_isolation import SURVEYING
 from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE
 from ..maths.vectors import add, spin, subtract
@@ -464,7 +465,7 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 
 KERNELS = (
     find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce_off, bounce, gain,
-    find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES,
+    find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES, *EQUATIONS,
 )  # fmt: skip
 
 

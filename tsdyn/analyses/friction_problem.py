@@ -22,6 +22,7 @@ from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..maths.complementarity import OPEN, STICKS
 from ..maths.dense_linalg import range_and_null_space
+from ..maths.dense_solve import least_squares, product
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
 from ..observables.evaluate import ITERATIONS, constraint_arrays
@@ -167,16 +168,16 @@ class Frictions:
         slip_velocities(q, qd, self.table, self.points, self.axes, v, sizes, axes)
         return v.reshape(-1, self.count, 3), sizes, axes.reshape(-1, self.count, 3)
 
-    def sizes(self, q, qd):
+    def sizes(self, q, qd, length):
         """What rounding of velocities at q, qd (n,) is a share of (units,): sizes of their terms.
 
-        Joints couple rates of turning to the velocities of their bodies: these count, over the scene's size.
+        Joints couple rates of turning to the velocities of their bodies: these count, over the scene's length, m.
         """
         if not self.count:
             return np.zeros(0)
         sizes, r = self.motions(q[None], qd[None])[1][0], self.packed.system.bodies[:, :1] + np.arange(3)
         passing = np.append(np.linalg.norm(qd[r], axis=1), 0.0)[self.ends].sum(axis=1)
-        return sizes + np.where(self.turns, passing, 0.0) / (self.packed.size or np.inf)
+        return sizes + np.where(self.turns, passing, 0.0) / (length or np.inf)
 
     def speeds(self, q, qd, memory):
         """Of those that slide (k, units): velocities along their directions, in a plane as of `within`."""
@@ -407,7 +408,7 @@ class RestProblem:
         self.pressed = self.pushing[:0]  # rows that contacts hold
         found, lam, left = gaps.workspace.solve(t, q, qd, memory, np.vstack([own_loads, sliding]))
         count, self.qdd = len(self.J), np.roll(found, 1, axis=0).T
-        G = self.J @ found.T
+        G = product(self.J, found.T)
         self.c, self.G, self.D = G[:, -1] + self.gamma, G[:, :count], G[:, count:-1]
         self.dead = dead = left[:count] <= RANK_TOL
         self.G[dead], self.G[:, dead], self.D[dead] = 0.0, 0.0, 0.0  # rates that no motion changes, as at a dead centre
@@ -429,7 +430,7 @@ class RestProblem:
         x, P = self._sliding(ways)
         if stick.size:
             right = np.column_stack([self.c + self.G @ x, self.D + self.G @ P])[stick]
-            held = -np.linalg.lstsq(self.G[np.ix_(stick, stick)], right, rcond=RANK_TOL**2)[0]
+            held = -least_squares(self.G[np.ix_(stick, stick)], right, RANK_TOL**2)
             x[stick], P[stick] = held[:, 0], held[:, 1:]
         if not self.normals:
             return x, np.zeros(0)
@@ -471,13 +472,13 @@ class RestProblem:
         acts, count = u >= 0, len(pushing) // 3
         pushes = np.where(np.isin(u, pushing), 1.0, -1.0) * acts
         G, across = self.G[np.ix_(u, u)] * acts[:, None] * pushes, self.G[np.ix_(u, stick)] * acts[:, None]
-        by_u = np.linalg.lstsq(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, u)] * pushes, rcond=RANK_TOL**2)[0]
-        G = G - across @ by_u
+        by_u = least_squares(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, u)] * pushes, RANK_TOL**2)
+        G = G - product(across, by_u)
         for _ in range(ITERATIONS):
             y = x + P @ N
             bounds, y[self._held(balls)] = [np.linalg.norm(y[self.at[i]]) for i in balls], 0.0
             own = self.c + self.G @ y + self.D @ N
-            held = np.linalg.lstsq(self.G[np.ix_(stick, stick)], own[stick], rcond=RANK_TOL**2)[0]
+            held = least_squares(self.G[np.ix_(stick, stick)], own[stick], RANK_TOL**2)
             p, mode, _ = self.cones.solve(G, own[u] * acts - across @ held, bounds)
             y[u[acts]] = (pushes * p)[acts]
             y[stick] = -held - by_u @ p
@@ -613,7 +614,7 @@ class RestProblem:
     def _left(self, i, rows):
         """Accelerations (r, r) of a unit by its own multipliers where rows (k,) hold."""
         rows, at = rows.astype(int), self.at[i]
-        held = np.linalg.lstsq(self.G[np.ix_(rows, rows)], self.G[np.ix_(rows, at)], rcond=RANK_TOL**2)[0]
+        held = least_squares(self.G[np.ix_(rows, rows)], self.G[np.ix_(rows, at)], RANK_TOL**2)
         return self.G[np.ix_(at, at)] - self.G[np.ix_(at, rows)] @ held
 
     def _rates(self, ways, a, small):
@@ -636,7 +637,7 @@ class RestProblem:
         if not left.any():
             return qd
         rows, left = np.append(rows, self.pressed), np.append(left, np.zeros(len(self.pressed)))
-        return qd - self.qdd[:, 1 + rows] @ np.linalg.lstsq(self.G[np.ix_(rows, rows)], left, rcond=RANK_TOL**2)[0]
+        return qd - self.qdd[:, 1 + rows] @ least_squares(self.G[np.ix_(rows, rows)], left, RANK_TOL**2)
 
     def _held(self, units):
         """The rows of some units."""

@@ -259,7 +259,7 @@ def _solve(c, t):
         return status
     write_positions(graph.bodies, f.poses, w.q)
     find_drift(graph, system, f, t)
-    land_velocities(graph, f, True)
+    land_velocities(graph, f)
     write_velocities(graph.bodies, f.poses, w.qd)
     evaluate_bias(graph, system, f, t)
     for i in range(f.Z.size):

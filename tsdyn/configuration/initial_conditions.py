@@ -152,7 +152,7 @@ def _land(c, t):
         return status
     write_positions(graph.bodies, f.poses, w.q)
     find_drift(graph, system, f, t)
-    land_velocities(graph, f, True)
+    land_velocities(graph, f)
     write_velocities(graph.bodies, f.poses, w.qd)
     return 0
 

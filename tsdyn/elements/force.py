@@ -212,7 +212,7 @@ def callbacks(cls, functions, owner=None):
     With an owner, a function of a user's, the kernels may allocate and raise.
     """
     constants = layout(cls.markers)
-    make = (lambda f: kernel(f, allocates=True)) if owner else inlined
+    make = _allocating if owner else inlined
     home = owner or getattr(functions["law"], "py_func", functions["law"])
     label = f"{owner.__qualname__}.{cls.__name__}" if owner else cls.__qualname__
     names = {**constants, "kernel_law": make(functions["law"]), "FRICTIONAL": "normal_load" in functions}
@@ -233,6 +233,10 @@ def callbacks(cls, functions, owner=None):
     if owner is None and ("normal_series" in functions or "normal_load" not in functions):
         result |= _series_callbacks(cls, label, names, functions)
     return MappingProxyType(result)
+
+
+def _allocating(function):
+    return kernel(function, allocates=True)
 
 
 def _friction_callbacks(cls, label, names, functions):

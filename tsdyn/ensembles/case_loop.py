@@ -16,13 +16,14 @@ from ..observables.reactions import demand_unique
 from ..observables.state import remembered
 from ..runs.driver import FIRST_SLICE, FIRST_WORK
 from ..runs.run_log import CHART_ROOM, NO_ROWS, RunEnd, RunLog, no_log
+from ..runs.run_memory import call_driver
 from ..runs.task import state_arrays
 from ..runs.tolerances import LONG_STEPS, TRIES
 from ..simulation.local_origin import are_near, origin_of
 from ..simulation.parameters import KEPT
 from ..taylor.layout import load_series
 from ..taylor.series_engine import SeriesEngine
-from ..taylor.stepper import advance_by_series
+from ..taylor.stepper import advance_series
 from ..workspaces import load_run, words
 from .case_numbers import OF_ROWS, Place
 from .cases import TIMES
@@ -167,6 +168,7 @@ class LoopNumbers(Record):
     moves: int  # whether starts differ
     may_land: int  # whether they may be projected
     grid: int  # whether outputs are kept, in place of the last state
+    driver: int  # address of `advance_series`
     take_start: int  # address of `take_start`; 0 where starts need no check
     start_context: int  # its arguments
     start_rates: int
@@ -281,7 +283,7 @@ def run_cases(context, run, where, chunk_at, first, end):
         enter_case(plan, chunk, k)
         if not take_start(plan, chunk, k, c, r):
             return k
-        status = advance_by_series(context, c, r, plan.log, numbers.most)
+        status = call_driver(numbers.driver, context, run, plan.log, numbers.most)
         if status != SUCCESS or r.numbers.near_steps != 0:
             numbers.ran, numbers.status = 1, status
             return k
@@ -308,7 +310,10 @@ class Batch:
     def __init__(self, workspace, task, first_slice):
         self._workspace, self._task, self._slice = workspace, task, first_slice
         self._numbers = LoopNumbers(
-            most=first_slice.rows, moves=workspace.writer.moves, grid=workspace.study.keep == TIMES
+            most=first_slice.rows,
+            moves=workspace.writer.moves,
+            grid=workspace.study.keep == TIMES,
+            driver=advance_series.address,
         )
         self._long, self._cases, self._memory, self._places, self._chunk = 0, 0, None, None, None
         self._start = None

@@ -209,7 +209,7 @@ def carry_out_start(reading, scene, start):
     if not isinstance(start, dict):
         mistakes.add_value(path, "start", start, "it must be a table: [start].")
         return
-    known = types.of_body(type(scene).assemble)
+    known = types.arguments_of(type(scene).assemble)
     known_keys(path, start, ("assemble", "set", *known), mistakes)
     assemble = start.get("assemble", False)
     if not isinstance(assemble, bool):
@@ -224,7 +224,7 @@ def carry_out_start(reading, scene, start):
 
 def _set(reading, scene, path, table):
     """Set the coordinates of a joint."""
-    known = types.of_body(type(scene).set)
+    known = types.arguments_of(type(scene).set)
     if not isinstance(table, dict) or not isinstance(table.get("joint"), str):
         reading.mistakes.add_value(path, "set", table, 'write { joint = "hinge", angle = 0.5 }.')
         return
@@ -504,7 +504,7 @@ def _add_body(reading, scene, path, table):
         return
     method, before = getattr(scene, types.BODY_TYPES[kind]), len(reading.mistakes.found)
     name = name_of(reading, path, table, what, reading.bodies)
-    known = types.of_body(method.__func__)
+    known = types.arguments_of(method.__func__)
     solid = "inertia" in known
     known_keys(path, table, ("type", "name", "drawn", *(["shape"] if solid else []), *known), reading.mistakes)
     given = arguments_in(reading, path, table, known, what)

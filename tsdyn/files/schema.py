@@ -106,7 +106,7 @@ def _property(argument):
 
 
 def _body(name, method):
-    known = types.of_body(method)
+    known = types.arguments_of(method)
     properties = {key: _property(argument) for key, argument in known.items()}
     drawn = {"type": "array", "items": {"$ref": "#/$defs/drawn"}}
     kind, required = {"type": {"const": name}, "drawn": drawn}, _required(known)
@@ -161,7 +161,7 @@ def _item(name, cls):
 
 
 def _start(scene):
-    known = {name: _property(argument) for name, argument in types.of_body(scene.assemble).items()}
-    coordinates = {name: _property(argument) for name, argument in types.of_body(scene.set).items()}
+    known = {name: _property(argument) for name, argument in types.arguments_of(scene.assemble).items()}
+    coordinates = {name: _property(argument) for name, argument in types.arguments_of(scene.set).items()}
     each = _closed(coordinates, ["joint"])
     return _closed({"assemble": {"type": "boolean"}, "set": {"type": "array", "items": each}, **known})

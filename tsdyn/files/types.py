@@ -294,16 +294,12 @@ def of_class(cls):
     return arguments_of(cls, [marker for marker in cls.markers if marker.placed])
 
 
-def of_body(cls):
-    """The arguments of a body."""
-    return arguments_of(cls)
-
-
 @cache
 def of_shape(cls):
     """The arguments of a shape to draw."""
     return {
-        name: one._replace(kind=ARRAY) if one.kind in (ANY, REFERENCE) else one for name, one in of_body(cls).items()
+        name: one._replace(kind=ARRAY) if one.kind in (ANY, REFERENCE) else one
+        for name, one in arguments_of(cls).items()
     }
 
 

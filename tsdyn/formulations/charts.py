@@ -220,14 +220,14 @@ def acceleration_by_turn(d, i, omega, j, omegad, k, out):
 
 
 @kernel
-def _add_weighted(mass, i, X, scale, out):
-    """out[21 + 6 r + c] += scale J' X, the columns of J' being at mass[i + 4 c]."""
+def _add_weighted(mass, i, X, out):
+    """out[21 + 6 r + c] += J' X, the columns of J' being at mass[i + 4 c]."""
     for r in range(3):
         for c in range(3):
             total = 0.0
             for a in range(3):
                 total += mass[i + 4 * a + r] * X[a, c]
-            out[21 + 6 * r + c] += scale * total
+            out[21 + 6 * r + c] += total
 
 
 @kernel
@@ -263,8 +263,8 @@ def add_inertia(mass, i, E, B, d, j, omega, k, K, C):
     for r in range(3):
         for c in range(3):
             Y[r, c] += E[r, c]
-    _add_weighted(mass, i, Y, 1.0, K)
-    _add_weighted(mass, i, X, 1.0, C)
+    _add_weighted(mass, i, Y, K)
+    _add_weighted(mass, i, X, C)
 
 
 # Validity of a chart in the tangent form. It is abandoned at the end of a step when one of two criteria is met, the

@@ -22,7 +22,6 @@ from ..rows.interface import (
     factorise_rows,
     find_correction,
     is_near_singular,
-    project,
     redundant_rows_hold,
     singularity_indicator,
 )
@@ -175,17 +174,14 @@ def find_drift(graph, system, f, t):
 
 
 @kernel
-def land_velocities(graph, f, drifting):
+def land_velocities(graph, f):
     """Project the velocities of the poses onto the tangent space, twice: the second projection removes rounding.
 
-    H, Y and S are those of the poses; with `drifting`, gamma is Phi_t.
+    H, Y and S are those of the poses, gamma is Phi_t.
     """
     gather_speeds(graph, f)
     for _ in range(2):
-        if drifting:
-            constrain(graph, f.rows, f.gamma, f.Z, f.b)
-        else:
-            project(graph, f.rows, f.Z, f.b)
+        constrain(graph, f.rows, f.gamma, f.Z, f.b)
     for b in range(graph.bodies.shape[0]):
         put(f.poses, b * POSE + RD, four(f.Z, 8 * b))
         put(f.poses, b * POSE + OMEGA, four(f.Z, 8 * b + 4))

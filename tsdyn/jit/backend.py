@@ -358,9 +358,9 @@ def options(allocates):
     return {"_nrt": allocates}
 
 
-def callee(function, options):
+def callee(function, options, allocates=False):
     """What compiles a kernel that kernels call."""
-    return _Dispatcher(function, {}, {"nopython": True, **options, "_nrt": False}, pipeline_class=_CalleeCompiler)
+    return _Dispatcher(function, {}, {"nopython": True, **options, "_nrt": allocates}, pipeline_class=_CalleeCompiler)
 
 
 def _twice(i):
@@ -400,7 +400,8 @@ def _probe_arguments(values, pair, i):
 def compile_probes():
     """Compile, and store, the kernels of the self-tests."""
     callback(_probe, _PROBE_TYPE, {"error_model": "numpy"}, False, "probe")
-    entry(_probe_arguments, {"nogil": True, "error_model": "numpy"}, lambda compile_for: compile_for).compile(_kinds())
+    options = {"nogil": True, "error_model": "numpy"}
+    entry(_probe_arguments, options, False, lambda compile_for: compile_for).compile(_kinds())
 
 
 def probe_files():
@@ -447,9 +448,9 @@ def shipped():
     return path
 
 
-def entry(function, options, around):
+def entry(function, options, allocates, around):
     """What compiles a kernel that Python calls; `around` decorates what compiles it."""
-    dispatcher = numba.njit(pipeline_class=Compiler, _nrt=False, **options)(function)
+    dispatcher = numba.njit(pipeline_class=Compiler, _nrt=allocates, **options)(function)
     dispatcher._cache = store = KernelCache(function)
     own = dispatcher.compile
 

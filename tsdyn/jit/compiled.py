@@ -82,7 +82,7 @@ def _entry(function):
     return function if DEBUG else _for_python(function, {"nogil": True, **OPTIONS})
 
 
-def _for_python(function, options):
+def _for_python(function, options, allocates=False):
     """A kernel that Python calls, compiled or loaded at its first call for some types of arguments."""
     plain = stock.entry(function, options, _compiling())
     if current() is stock:
@@ -95,34 +95,39 @@ def _for_python(function, options):
 
         return compile_for
 
-    return current().entry(function, options, guarded)
+    return current().entry(function, options, allocates, guarded)
+
+
+def is_copy(function):
+    """Whether a function, or its kernel, is a copy of one of tsdyn's (`kernels.specialised`)."""
+    return getattr(function, "is_copy", False)
 
 
 class Callee:
     """A kernel that kernels call; what Numba needs to compile it is made when a caller is compiled."""
 
-    def __init__(self, py_func, options):
-        self.py_func, self.targetoptions, self._made = py_func, options, {}
+    def __init__(self, py_func, options, allocates):
+        self.py_func, self.targetoptions, self._allocates, self._made = py_func, options, allocates, {}
         update_wrapper(self, py_func)
 
     def dispatcher(self):
         """What Numba compiles it by."""
         way = current()
         if way not in self._made:
-            self._made[way] = way.callee(self.py_func, self.targetoptions)
+            self._made[way] = way.callee(self.py_func, self.targetoptions, self._allocates)
         return self._made[way]
 
     @cached_property
     def _from_python(self):
-        return _for_python(self.py_func, self.targetoptions)
+        return _for_python(self.py_func, self.targetoptions, self._allocates)
 
     def __call__(self, *arguments, **keywords):
         """For whoever tries a kernel: it is compiled, or loaded, for Python."""
         return self._from_python(*arguments, **keywords)
 
     def __reduce__(self):
-        """By name, as functions are."""
-        return self.__qualname__
+        """By name, as functions are; a copy, which no module has under its name, by what it is made of."""
+        return (Callee, (self.py_func, self.targetoptions, self._allocates)) if is_copy(self) else self.__qualname__
 
 
 @typeof_impl.register(Callee)

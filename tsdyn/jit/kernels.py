@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 
 from ..errors import InvalidConstraint
 from .code_hash import is_ours
-from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, letters, table
+from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, is_copy, letters, table
 from .compilers import current
 from .resident import (
     ANY,
@@ -95,8 +95,8 @@ def kernel(function, allocates=False, inline=True):
         )
     else:
         options = {**OPTIONS, "forceinline": inline}
-        if is_ours(function.__module__) and not DEBUG:
-            return Callee(function, options)
+    if not DEBUG and (is_copy(function) or (is_ours(function.__module__) and not allocates)):
+        return Callee(function, options, allocates)
     return function if DEBUG else numba.njit(**options, **current().options(allocates))(function)
 
 
@@ -135,15 +135,39 @@ def specialised(template, name, owner, make=kernel, **constants):
     Each `part` that it calls is copied in the same way and made a kernel by `make`.
     """
     known = template.__globals__
-    parts = {
-        called: make(specialised(known[called], f"{name}.{called}", owner, make, **constants))
-        for called in template.__code__.co_names
-        if getattr(known.get(called), "is_part", False)
-    }
+    parts = {called: _copied(known[called], owner, make, constants) for called in _parts_of(template)}
     code = template.__code__.replace(co_filename=owner.__code__.co_filename, co_name=name, co_qualname=name)
     copy = type(template)(code, {**known, **constants, **parts}, name)
     copy.__qualname__, copy.__module__ = name, owner.__module__
+    copy.is_copy = is_ours(known["__name__"])  # whatever module it claims to be of
     return copy
+
+
+_copies = {}  # kernels of parts
+
+
+def _copied(template, owner, make, constants):
+    """The kernel of a part: one for all loops in which what it names of the constants is the same."""
+    named = list(_named(template, constants))
+    if all(is_ours(getattr(value, "py_func", template).__module__) for _, value in named):
+        owner = template
+    values = ((name, value if callable(value) else repr(value)) for name, value in named)
+    key = template, make, owner.__module__, *values
+    if key not in _copies:
+        _copies[key] = make(specialised(template, template.__qualname__, owner, make, **constants))
+    return _copies[key]
+
+
+def _parts_of(template):
+    """Names of the parts that a template calls."""
+    return [name for name in template.__code__.co_names if getattr(template.__globals__.get(name), "is_part", False)]
+
+
+def _named(template, constants):
+    """The constants that a template, and the parts that it calls, name."""
+    yield from ((name, constants[name]) for name in template.__code__.co_names if name in constants)
+    for part in _parts_of(template):
+        yield from _named(template.__globals__[part], constants)
 
 
 def caller(signature, result="i", linked=None):

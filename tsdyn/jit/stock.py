@@ -21,7 +21,7 @@ def options(allocates):
     return {}
 
 
-def callee(function, options):
+def callee(function, options, allocates):
     """What compiles a kernel that kernels call."""
     return numba.njit(**options)(function)
 

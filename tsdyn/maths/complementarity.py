@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from ..jit.kernels import entry, kernel, stack
+from .dense_solve import least_squares, product, solve
 from .tolerances import (
     CONE_FACTORS,
     CONE_LEFT,
@@ -78,16 +79,17 @@ class _Rows:
 
     def __init__(self, M, q, held):
         self.M, self.q, self.held, self.passed = M, q, held, set()
-        try:
-            self._solve()
-        except np.linalg.LinAlgError:
-            held.clear()
+        self._solve()
 
     def _solve(self):
         """z of the held rows; without those where it is negative."""
         h, self.z = self.held, np.zeros(self.q.size)
         while h:
-            self.z[h] = z = np.linalg.solve(self.M[h][:, h], -self.q[h])
+            z = solve(self.M[h][:, h], -self.q[h])
+            if z is None:  # rows of a guess that depend on each other
+                h.clear()
+                break
+            self.z[h] = z
             k = int(z.argmin())
             if z[k] >= 0.0:
                 break
@@ -104,7 +106,7 @@ class _Rows:
         """Let z_i grow until row i is held; False if it could for ever."""
         M, z, h = self.M, self.z, self.held
         while True:
-            follow = np.linalg.solve(M[h][:, h], M[h, i]) if h else np.zeros(0)
+            follow = solve(M[h][:, h], M[h, i]) if h else np.zeros(0)
             pivot, w = M[i, i] - M[i, h] @ follow, M[i] @ z + self.q[i]
             whole = -w / pivot if pivot > LEAST_PIVOT else np.inf
             falls = follow > NEGLIGIBLE
@@ -261,13 +263,10 @@ def _step(A, D, F):
 
     A = I - D (I - r G): with G + CONE_SHIFT I, as if every contact gave way a little, A is regular.
     """
-    try:
-        x = np.linalg.solve(A + CONE_SHIFT * D, F)
-        if np.abs(F - A @ x).max() <= CONE_SHIFTED * np.abs(F).max():
-            return x
-    except np.linalg.LinAlgError:
-        pass
-    return np.linalg.lstsq(A, F, rcond=RANK_TOL**2)[0]
+    x = solve(A + CONE_SHIFT * D, F)
+    if x is not None and np.abs(F - A @ x).max() <= CONE_SHIFTED * np.abs(F).max():
+        return x
+    return least_squares(A, F, RANK_TOL**2)
 
 
 class _Problem:
@@ -323,7 +322,7 @@ class _Problem:
                 most = (max(share * terms, self.rounding) for share in (left, CONE_LEFT))
                 return nearest if all(x <= y for x, y in zip((best, normal), most, strict=True)) else None
             D = self.slope(y)
-            step = _step(eye - D @ (eye - factor * self.G), D, -F)
+            step = _step(eye - product(D, eye - factor * self.G), D, -F)
             share = 1.0
             while True:
                 trial = p + share * step

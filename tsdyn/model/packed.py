@@ -177,6 +177,14 @@ def reaches_of(primitive, places):
     return max((size for code, size in sizes if code == POINT), default=0.0), max((s for _, s in sizes), default=0.0)
 
 
+def reach_of(packed):
+    """The largest distance of a point of constraints and forces from its body's centroid, m; axes are no lengths."""
+    places = [*zip(packed.constraints, packed.coordinates, strict=True)]
+    places += [(load.force, load.coordinates) for load in packed.loads]
+    points = [s for part, own in places for marker, s in zip(part.markers, own, strict=True) if marker.code == POINT]
+    return float(np.linalg.norm(points, axis=1).max()) if points else 0.0
+
+
 def size_of_reaches(reaches):
     """The same as `size_of`, from those of each primitive."""
     length = max((each[0] for each in reaches), default=0.0)

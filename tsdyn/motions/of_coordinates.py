@@ -170,9 +170,9 @@ class JointFunction(CoordinateFunction):
         return "its function has too many operations" if self._series.rows > ROWS else ""
 
 
-def _derivative(node, j, known=None):
+def _derivative(node, j):
     """The derivative of a graph of inputs by input j, as a graph."""
-    known = {} if known is None else known
+    known = {}
     for each in ordered([node]):
         x = each._operands
         slopes = [known[id(operand)] for operand in x]

@@ -147,12 +147,13 @@ class ChannelNames:
             loads[f"{name}.axis"] = unit, (), partial(_along, item, own, i, exerted), _whole
             if item.drives or isinstance(item, Force):
                 main = [f"{name}.axis"]
-        if any(hasattr(type(part), "contact") for part in getattr(item, "parts", ())):
+        rolls = any(hasattr(type(part), "contact") for part in getattr(item, "parts", ()))
+        if rolls or getattr(item, "has_friction", False):
             names = {"contact_point": ("m", AXES), "friction_demand": ("1", ())}
             for name, (unit, parts) in names.items():
                 ask = partial(_refused, item, self.lacks) if self.lacks else partial(_asked, name, item)
                 loads[name] = unit, parts, ask, _whole
-            natural = ["contact_point"]
+            natural = ["contact_point"] if rolls else natural
         if isinstance(item, (Spring, Distance)):
             load = loads_of(self.packed).get(id(item)) or member(self.packed, item)
             ends = list(zip((item.a, item.b), load.coordinates, strict=True))

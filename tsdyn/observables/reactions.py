@@ -578,14 +578,15 @@ def shared(motion):
 
 
 def friction_demand(motion, item):
-    """Tangential over normal force (k,); infinite where the surfaces would have to pull."""
+    """Tangential over normal force (k,); infinite where the surfaces would have to pull, zero where they are apart."""
     item = handles_of(motion.packed).item(item)
     _, normal = _contact(motion, item)
     force, _ = exerted(shared(motion), item, item.on)
     force = force if item.on is item.a else -force
     push = np.einsum("ki,ki->k", normal, force)
     tangential = np.linalg.norm(force - push[:, None] * normal, axis=1)
-    return np.divide(tangential, push, out=np.full(len(push), np.inf), where=push > 0.0)
+    demand = np.where((push == 0.0) & (tangential == 0.0), 0.0, np.inf)
+    return np.divide(tangential, push, out=demand, where=push > 0.0)
 
 
 def _contact(motion, item):

@@ -190,12 +190,6 @@ def solve(pattern, values, b):
 
 
 @kernel
-def solve_lu_transposed(pattern, lower, upper, b):
-    """Solve N^T x = b in place, by the factors of `factor_lu`."""
-    solve_lu(pattern, upper, lower, b)
-
-
-@kernel
 def solve_lu(pattern, lower, upper, b):
     """Solve N x = b in place, b (rows,) in elimination order, by the factors of `factor_lu`."""
     if pattern.shape[0] == 1:

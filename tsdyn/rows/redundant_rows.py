@@ -9,7 +9,7 @@ import math
 from ..elements.loops.constraint_rows import POSE, R
 from ..jit.kernels import kernel
 from ..jit.simd import four, put, splat
-from ..maths.dense_linalg import copy
+from ..maths.dense_linalg import copy, largest
 from ..maths.tolerances import HALF_DIGITS
 from .tolerances import HELD
 
@@ -71,6 +71,7 @@ def leave_redundant_rows(graph, f, Phi, H):
 @kernel
 def rates_hold_along(graph, f, Z):
     """Whether the redundant rows on velocities vanish for Z (b, 8), which the other rows admit."""
+    rounding = HALF_DIGITS * largest(Z)  # of bodies that the other rows hold, nothing else is left
     for i in range(f.dropped[0]):
         row, total, terms = f.dropped[1 + i], 0.0, 0.0
         for side in range(2):
@@ -78,7 +79,7 @@ def rates_hold_along(graph, f, Z):
             for part in range(0, 8 if b < graph.bodies.shape[0] and is_rate(graph, row) else 0, 4):
                 for c in range(part, part + 3):
                     total += f.redundant.H[at + c] * Z[8 * b + c]
-                terms += length(f.redundant.H, at + part) * length(Z, 8 * b + part)
+                terms += length(f.redundant.H, at + part) * (length(Z, 8 * b + part) + rounding)
         if not abs(total) <= HALF_DIGITS * terms:
             return False
     return True

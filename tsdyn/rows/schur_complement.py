@@ -281,8 +281,8 @@ def _gather_tails(graph, H, values, width, first, out):
 
 
 @kernel
-def _scatter(graph, Y, lam, Z):
-    """Z <- Z - Y^T lam."""
+def apply_columns(graph, Y, lam, Z):
+    """Z <- Z - Y^T lam, for Y, H, or others of their layout."""
     # Z_a and Z_b stay in registers over the rows of a pair of bodies; then the later terms of sums
     i = j = 0
     a, c, b, d = four(Z, 0), four(Z, 4), four(Z, 0), four(Z, 4)
@@ -347,19 +347,13 @@ def multiply_rates(graph, rows, poses, out):
 @kernel
 def apply_multipliers(graph, rows, lam, Z):
     """Z <- Z - Y^T lam."""
-    _scatter(graph, rows.Y, lam, Z)
-
-
-@kernel
-def apply_columns(graph, X, lam, Z):
-    """Z <- Z - X^T lam, X being of the layout of Y."""
-    _scatter(graph, X, lam, Z)
+    apply_columns(graph, rows.Y, lam, Z)
 
 
 @kernel
 def take_reactions(graph, rows, lam, F):
     """F <- F - H^T lam, loads on bodies."""
-    _scatter(graph, rows.H, lam, F)
+    apply_columns(graph, rows.H, lam, F)
     take_inertia_reactions(graph, rows, lam, F)
 
 
@@ -372,7 +366,7 @@ def find_correction(graph, rows, b, Z):
     solve(graph.pattern, rows.S, b)
     for i in range(Z.size):
         Z[i] = 0.0
-    _scatter(graph, rows.Y, b, Z)
+    apply_columns(graph, rows.Y, b, Z)
 
 
 @kernel
@@ -383,7 +377,7 @@ def project(graph, rows, Z, lam):
     """
     _gather(graph, rows.H, Z, lam)
     solve(graph.pattern, rows.S, lam)
-    _scatter(graph, rows.Y, lam, Z)
+    apply_columns(graph, rows.Y, lam, Z)
 
 
 @kernel
@@ -399,7 +393,7 @@ def constrain(graph, rows, c, Z, lam):
         lam[e] += c[e]
         worst = max(worst, abs(lam[e]))
     solve(graph.pattern, rows.S, lam)
-    _scatter(graph, rows.Y, lam, Z)
+    apply_columns(graph, rows.Y, lam, Z)
     return worst
 
 
@@ -421,7 +415,7 @@ def constrain_accelerations(graph, rows, gamma, Z, lam):
     """
     acceleration_residuals(graph, rows, gamma, Z, lam)
     solve(graph.pattern, rows.S, lam)
-    _scatter(graph, rows.Y, lam, Z)
+    apply_columns(graph, rows.Y, lam, Z)
 
 
 @kernel
@@ -429,7 +423,7 @@ def factorise_and_constrain(graph, rows, gamma, Z, lam):
     """The same with S of `form_selected_rows`, which is factored; return the row that fails, or -1."""
     acceleration_residuals(graph, rows, gamma, Z, lam)
     failed = factor_and_solve(graph.pattern, rows.S, lam, PIVOT_ROUNDING)
-    _scatter(graph, rows.Y, lam, Z)
+    apply_columns(graph, rows.Y, lam, Z)
     return failed
 
 
@@ -441,7 +435,7 @@ def balance_loads(graph, rows, F, lam):
     """
     _gather(graph, rows.Y, F, lam)
     solve(graph.pattern, rows.S, lam)
-    _scatter(graph, rows.H, lam, F)
+    apply_columns(graph, rows.H, lam, F)
 
 
 # The chart matrix N = H C Y0, the derivative of Phi with respect to -u, and other matrices H X^T.

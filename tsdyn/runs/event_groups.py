@@ -95,6 +95,14 @@ class Group:
         """Take the values (members,) at the start of a run."""
         self.value[:], self.noise[:], self._odd[:], self.is_new = values, self.least, 0, True
 
+    def cross(self, values):
+        """Take values (members,) after a stop; the numbers of those that end the run since they have changed sign."""
+        clear = np.abs(values) > self.noise
+        ends = clear & (self._falls * self.value < 0.0) & (self._falls * values > 0.0)
+        self.value[:] = values
+        self._odd[clear] = 0
+        return [self.numbers[i] for i in ends.nonzero()[0].tolist()]
+
     def lend(self, track, i, t):
         """Let the `Track` of member i know what is known at t, the start of the step that has been searched."""
         value = float(self._first[i])

@@ -1,6 +1,7 @@
 """Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
+from bisect import bisect_left
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -93,11 +94,19 @@ UNSEARCHED, UNBEGUN, NOT_BEGUN = 1, 2, 3  # how flights end: a step isn't search
 ROOM = 64  # states that are kept
 
 
+def is_stop(log, t):
+    """Whether t is a stop, where loads may jump."""
+    stops = log.stops
+    i = bisect_left(stops, t, key=lambda stop: stop[0])
+    return i < len(stops) and stops[i, 0] == t
+
+
 class Inside:
     """States within the step that a run has just made."""
 
     def __init__(self, reader, run, log, start, spins):
         (self.t0, before, self.near), self.t1, self._spins = start, run.clock.t, spins
+        self._stop = self.t1 if is_stop(log, self.t1) else math.inf
         t0 = self.t0
         self.reader, self.steps = reader, (run.block, log.charts, log.points)
         self.known = {t0: before, self.t1: run.now.copy()}
@@ -108,6 +117,10 @@ class Inside:
         rates = np.array([self.known[t][1] for t in (self.t0, self.t1)]).take(self._spins, axis=1)
         rates *= rates
         return 2.0 * math.sqrt(rates.sum(axis=2).max(initial=0.0))
+
+    def before_stop(self, times):
+        """Times (k,), but just before the end where loads may jump there: the step is that of those before."""
+        return np.where(times == self._stop, math.nextafter(self.t1, self.t0), times)
 
     def states(self, times):
         """States (3, n) at times (k,), None where there is none."""
@@ -283,6 +296,13 @@ class Watch:
                         return status, reason
             if answer is not None and status == Status.SLICE_DONE:
                 status = answer(log)
+            if unsearched and status == Status.SLICE_DONE and not self.begins_again and is_stop(log, self.t):
+                try:
+                    last = self._cross_stop(run, log)
+                except EventFailed as failure:
+                    return failure.status, str(failure)
+                if last is not None and not self._is_resumed(memory, last):
+                    return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
@@ -519,9 +539,22 @@ class Watch:
             raise failure
         return None
 
+    def _cross_stop(self, run, log):
+        """Take the values of groups with the loads after a stop; the `Occurrence` that ends the run there, or None."""
+        self.state, self.memory = run.now.copy(), run.remembered.copy()
+        self._note_start()
+        found = None
+        for group in self._groups:
+            if group.kernel is not None:  # gaps, which don't depend on loads
+                continue
+            for i in group.cross(self._at_start(group)):
+                found = Occurrence(self.t, i, self.state)
+                self.list[i].append(found)
+        return found
+
     def _search_group(self, group, step):
         """As `Group.search`."""
-        sample = lambda times: self._sample(group, times, step.levels(times))  # noqa: E731
+        sample = lambda times: self._sample(group, step.before_stop(times), step.levels(times))  # noqa: E731
         degree = lambda time: self._degree(step.turning * time, limits.SLOW_SMOOTH_TURN, limits.FAST_SMOOTH_TURN)  # noqa: E731
         return group.search(step, sample, degree)
 
@@ -556,7 +589,7 @@ class Watch:
         if falls is None:
             before = last.t - limits.SHORTLY * (last.t - step.t0)
             times = np.array([before, last.t])
-            first, value = self._sample(group, times, step.levels(times))
+            first, value = self._sample(group, step.before_stop(times), step.levels(times))
             falls = (value < first) & (value * (last.t - before) <= limits.SAME_INSTANT * abs(last.t) * (first - value))
         for i, also in zip(group.numbers, falls.tolist(), strict=True):
             if also and i != last.index:
@@ -571,7 +604,7 @@ class Watch:
         def sample(times):
             values, function = np.full(times.size, np.nan), self.events[i].function
             if is_member:
-                return function.over(self._states(times, step.levels(times)))[:, function.which]
+                return function.over(self._states(step.before_stop(times), step.levels(times)))[:, function.which]
             states = step.states(times)
             for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
                 if state is not None:

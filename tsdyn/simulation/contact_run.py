@@ -294,7 +294,7 @@ class _ContactRun(Transitions, Checkpoints):
                 break
             self.q, self.qd = task.q, task.qd
             self.ended = self.qd
-            if self._transit(sunk) is not None:
+            if self._transit(sunk, sunk=sunk) is not None:
                 raise InconsistentState(self.reason)
         return phase, run, call, task
 
@@ -473,7 +473,7 @@ class _ContactRun(Transitions, Checkpoints):
         light = [i for i in modes.limits if i not in modes.sticking]
         loaded, units = [*sticking, *light], [[frictions.units[i] for i in some] for some in (sticking, light)]
         breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in loaded])).over
-        slowing = Slowing(frictions, modes.begun, frictions.sizes(self.q, self.qdd)).over
+        slowing = Slowing(frictions, modes.begun, frictions.sizes(self.q, self.qdd, self.length)).over
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
@@ -567,11 +567,14 @@ class _ContactRun(Transitions, Checkpoints):
         self.reason = ""  # which told what ends the phase
         return Status.SUCCESS
 
-    def _is_deep(self):
-        """Whether contacts penetrate; says so. Notes the gaps, and which are zero within rounding, or below."""
+    def _is_deep(self, sunk=()):
+        """Whether contacts penetrate, but those that a start has taken below zero; says so.
+
+        Notes the gaps, and which are zero within rounding, or below.
+        """
         self.gap, lengths = self.gaps.at(self.q, self.remembered[: self.count]), self.gaps.lengths(self.length)
         self.near = (self.gap <= START_ZERO * lengths).nonzero()[0].tolist()
-        deep = [i for i in self.near if self.gap[i] < -PENETRATION * lengths[i] and i in self.able]
+        deep = [i for i in self.near if self.gap[i] < -PENETRATION * lengths[i] and i in self.able and i not in sunk]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."

@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..analyses.contact_friction import spread
+from ..analyses.contact_friction import shared
 from ..analyses.contact_problem import slip_rows
 from ..analyses.contact_rows import reaction_workspace
 from ..analyses.tolerances import EVENT_ERROR, LEAST_SLIP
@@ -112,7 +112,7 @@ class Reactions:
         held = N[:, self.which]
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
         memory = np.tile(states.memory, (states.t.size, 1))
-        T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
+        N[:, self.which], T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
         N = N + self.slack
         return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
 
@@ -131,13 +131,18 @@ def _slip_columns(contact, first):
 
 
 def carried(gaps, which, t, q, memory, N, T):
-    """Friction (k, c, 2) of contacts that stick, where rows depend on others shared in proportion to N (k, c)."""
-    rows = np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)  # at singular configurations N is NaN, too
-    if rows.any():
-        T[rows] = np.nan_to_num(T[rows])
-        responses = np.array([gaps.responses(t[k], q[k], memory[k], which) for k in np.flatnonzero(rows)])
-        T[rows] = spread(gaps.static[which] * N[rows], responses, T[rows])
-    return T
+    """N (k, c) and friction (k, c, 2) of contacts that stick, where rows depend on others.
+
+    Friction is shared in proportion to N, but where reactions brace each other, see `braced`.
+    """
+    N, T = N.copy(), T.copy()
+    for k in np.flatnonzero(
+        np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)
+    ):  # else at singular ones N is NaN
+        loads = gaps.responses(t[k], q[k], memory[k], which)
+        p = shared(gaps.static[which], loads.reshape(3 * len(which), -1), np.column_stack([N[k], np.nan_to_num(T[k])]))
+        N[k], T[k] = p[:, 0], p[:, 1:]
+    return N, T
 
 
 class Halting:
@@ -219,17 +224,28 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
         for j, i in enumerate(sticks):
             T[:, j, [k for k, held in enumerate(modes.grips[frictional[i]]) if not held]] = np.nan
         redundant, alone = np.isnan(T), np.nan_to_num(T)
-        T = carried(gaps, [frictional[j] for j in sticks], t, q, memory, N[:, sticks], T)
+        own = N[:, sticks]
+        N[:, sticks], T = carried(gaps, [frictional[j] for j in sticks], t, q, memory, own, T)
         if redundant.any():
             # M qdd + Phi_q^T (lam + change) = Q + J^T T    J: redundant slips
             f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
+            more = N[:, sticks] - own
+            if more.any():
+                which = [frictional[j] for j in sticks]
+                normals = np.array([gaps.normals(*pair, which) for pair in zip(t, q, strict=True)])
+                f = np.einsum("kc,kcn->kn", more, normals) + np.einsum("kci,kcin->kn", T - alone, tangents[:, sticks])
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
             pushing = [first[id(_gap_row(gaps, modes, i))] for i in frictional]
             moves = np.abs(change[:, pushing]).max(axis=1) > EVENT_ERROR * np.abs(N).max(axis=1)
             change[moves], T[moves] = 0.0, alone[moves]
+            for j, i in enumerate(sticks):
+                N[moves, i] = own[moves, j]
             out[:, shared[0]] += change[:, shared[1]]
         out[:, rows[sticks]] = -T
+        if (N[:, sticks] != own).any():
+            which = [frictional[j] for j in sticks]
+            out[:, gaps.rows[which]] = -gaps.sign[which] * N[:, sticks]
     slip = np.einsum("kcin,kn->kci", tangents, qd)
     for j, i in enumerate(frictional):
         if modes.slides(i):

@@ -149,6 +149,11 @@ class Prepared:
         return [load.force.title for load in self.packed.loads if "normal_load" in load.force.kernels]
 
     @cached_property
+    def veers(self):
+        """Whether there is friction of the exact law whose direction turns: fast where the slip is slow."""
+        return any(slide.directions > 1 for load in self.packed.loads for slide in getattr(load.force, "slides", ()))
+
+    @cached_property
     def series(self):
         """Data shared by Taylor runs, a `Series`."""
         return Series(self.packed, self.refusal)

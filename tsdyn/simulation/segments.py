@@ -153,7 +153,7 @@ class Turns:
 
         A trial may cost as much as was lost before: steps at the limit of stability keep fast modes alive.
         """
-        left, rough = self.end - memory.run.clock.t, self.prepared.rough
+        left, rough = self.end - memory.run.clock.t, self.prepared.rough or self.prepared.veers
         jacobians = memory.work.counters.jacobians
         if steps <= self._first:
             self.jacobians = jacobians

@@ -14,6 +14,7 @@ from ..errors import (
     Status,
 )
 from ..jit.kernels import twin
+from ..maths.dense_solve import product
 from ..maths.tolerances import EPS, NEGLIGIBLE, RANK_TOL
 from ..model.handles import handles_of
 from ..observables.generalised_forces import force_loads
@@ -38,13 +39,13 @@ def contact_state(inertia, resting, qd, fired=()):
 class Transitions:
     """Mixed into `_ContactRun`: what it does between two phases."""
 
-    def _transit(self, fired, measured=True):
+    def _transit(self, fired, measured=True, sunk=()):
         """From one phase to the next one, after events of the units `fired`; the Status if there is no way on.
 
-        measured: whether the energy that impacts take is noted.
+        measured: whether the energy that impacts take is noted; sunk: gaps that a start has taken below zero.
         """
         self.reason, qd = "", self.qd
-        if self._is_deep() or self._is_stuck():
+        if self._is_deep(sunk) or self._is_stuck():
             return Status.CONTACT_FAILED
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         # What was to rise by less than rounding, and has risen by more, is open
@@ -133,7 +134,8 @@ class Transitions:
             left = [i for i, (at, _, rate, _) in before.opened.items() if rate == 0.0 and self._is_now(at)]
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            rounding = self._rounding(before) + NEGLIGIBLE * self.frictions.sizes(self.q, self._largest(self.qd - qd))
+            struck = self._largest(self.qd - qd)
+            rounding = self._rounding(before) + NEGLIGIBLE * self.frictions.sizes(self.q, struck, self.length)
             self.modes, struck = UnitModes(), self.qd
             if self.gaps.rough[resting].any():
                 self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)
@@ -143,7 +145,7 @@ class Transitions:
                     rates = inertia.rates(self.qd)
             else:
                 contacts = solve_contacts(inertia, resting, self.qd, leaving)
-            rounding += self.frictions.sizes(self.q, self.qd - struck)
+            rounding += self.frictions.sizes(self.q, self.qd - struck, self.length)
             if opening:
                 self._open(inertia, opening, rates, -contacts.accelerations)
             self._take_contacts(contacts, before)
@@ -269,7 +271,7 @@ class Transitions:
         v, _, _ = frictions.motions(self.q[None], self.qd[None])
         # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
         # once: where loads vanish along a chain events would follow each other ever faster
-        sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
+        sizes, rates = (frictions.sizes(self.q, each, self.length) for each in (self.qd, self.qdd))
         paces = frictions.paces(sizes, rates, np.linalg.norm(self.scene.system.gravity), self.length)
         place = frictions.at(self.q, paces)
         least = np.maximum(NEGLIGIBLE * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
@@ -353,7 +355,7 @@ class Transitions:
         for k, numbers in enumerate(place.numbers(i, basis)):
             memory[np.array(unit.held(k))] = numbers
         rows = gradients(packed, self.t, self.q, memory)[packed.derived.holds[unit.slot]]
-        return rows @ self.gaps.workspace.respond(self.t, self.q, memory, rows).T
+        return product(rows, self.gaps.workspace.respond(self.t, self.q, memory, rows).T)
 
     def _motions_of(self, place, i):
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""

@@ -465,12 +465,7 @@ def _move_on(context, c, r, log, t1):
 @callback("pppi")
 def advance_series(context, run, log, most):
     """Make up to `most` steps, as `stepper.advance` does; context is the address of a `SeriesContext`. Status."""
-    return advance_by_series(context, load_series(context), load_run(run), load_log(log), most)
-
-
-@kernel
-def advance_by_series(context, c, r, log, most):
-    """As `advance_series`, for kernels that call it."""
+    c, r, log = load_series(context), load_run(run), load_log(log)
     adaptive, status = r.numbers.adaptive == 1, 0
     # Begin, or go on after Python was asked at a stop
     if r.numbers.begun == 0 and most != 0:

@@ -88,21 +88,17 @@ def demand_repeatable(make, case, form, where):
     method = make()
     first = finished(run_case(case, method, form), where)
     again = run_case(case, make(), form)
-    if not all(_same(a, b) for a, b in zip(_bits(first), _bits(again), strict=True)):
+    if not all(np.array_equal(a, b) for a, b in zip(_bits(first), _bits(again), strict=True)):
         raise CheckFailed(f"{where}: {method!r} is not reproducible: a second run gives other numbers.")
     other = run_case(case, make(), form, t_eval=case.inner, dense_output=True)
-    if not (_same(first.steps.t, other.steps.t) and _same(first.steps.h, other.steps.h)):
+    if not (np.array_equal(first.steps.t, other.steps.t) and np.array_equal(first.steps.h, other.steps.h)):
         raise CheckFailed(f"{where}: {method!r} takes other steps when output between the steps is requested.")
-    if not (_same(first.state.q, other.state.q) and _same(first.state.qd, other.state.qd)):
+    if not (np.array_equal(first.state.q, other.state.q) and np.array_equal(first.state.qd, other.state.qd)):
         raise CheckFailed(f"{where}: {method!r} ends elsewhere when output between the steps is requested.")
 
 
 def _bits(solution):
     return solution.t, solution.q, solution.qd, solution.qdd, solution.steps.t, solution.steps.h
-
-
-def _same(a, b):
-    return np.array_equal(a, b)
 
 
 # The order of a method and of its dense output, fitted to the errors of runs with fixed steps.

@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..constraints import Distance, PlaneContact, Spherical
+from ..constraints import Distance
 from ..integrators import DOP853, RK45
+from ..measuring.haug_tables import sliding_top, two_body_pendulum
 from ..measuring.tolerances import REFERENCE_TOLERANCES
 from ..simulation.prepared_run import simulate
 from ..simulation.scene import Scene
@@ -31,21 +32,11 @@ class ReferenceScene(NamedTuple):
     trusted: float
 
 
-def sliding_top():
-    """A top on a plane without friction: one constraint, fast rotation."""
-    scene = Scene(gravity=(0.0, 0.0, -9.6))
-    top = scene.add_body(30.0, (90.0, 90.0, 30.0), position=(0.0, 0.0, 1.0), angular_velocity=(0.5, 0.0, 12.0))
-    scene.add(PlaneContact(top, scene.ground, point_a=(0.0, 0.0, -1.0), normal_b=(0.0, 0.0, 1.0)))
-    return scene
-
-
-def two_body_pendulum():
-    """Two spheres on a joint and a rod, turning in space."""
-    scene = Scene(gravity=(0.0, 0.0, -9.6))
-    one = scene.add_body(75.0, (30.0, 30.0, 30.0), angular_velocity=(0.3, 0.0, 0.0))
-    two = scene.add_body(75.0, (30.0, 30.0, 30.0), position=(0.0, 0.0, -3.0), angular_velocity=(2.0, 5.0, 1.0))
-    scene.add(Spherical(scene.ground, one))
-    scene.add(Distance(one, two, point_a=(0.0, 0.0, -1.0), point_b=(0.0, 0.0, 1.0), length=1.0))
+def turning_pendulum():
+    """The two-body pendulum of the tables, its bodies turning in space."""
+    scene = two_body_pendulum()
+    for body, rate in zip(scene.bodies, ((0.3, 0.0, 0.0), (2.0, 5.0, 1.0)), strict=True):
+        body.angular_velocity = rate
     return scene
 
 
@@ -62,8 +53,8 @@ def driven_pendulum():
 
 
 SCENES: dict[str, tuple[Callable[[], Scene], float]] = {
-    "sliding top": (sliding_top, 10.0),
-    "two-body pendulum": (two_body_pendulum, 10.0),
+    "sliding top": (lambda: sliding_top((0.5, 0.0, 12.0)), 10.0),
+    "two-body pendulum": (turning_pendulum, 10.0),
     "driven pendulum": (driven_pendulum, 3.0),
 }
 

@@ -179,3 +179,46 @@ def test_dominoes_that_wedge_have_several_motions():
         assert min(pushes.values()) > 0.1
     # Within a plane there is one motion
     assert ts.simulate(dominoes(planar=True), (0, 1.3)).success
+
+
+@pytest.mark.parametrize("spin", [0.0, 3.0])
+def test_a_box_on_a_table_that_is_shaken_slides_to_and_fro(spin):
+    """The drive does work where the box comes to rest on the table; friction does none. The spin dies out.
+
+    In the end the velocity of the box is a triangular wave, of slope mu g, that meets the table's at its peaks:
+    A w cos(w t) = mu g T / 4.
+    """
+    A, w, mu, end = 0.2, 6.0, 0.3, 3.0
+    scene = ts.Scene(gravity=(0, 0, -G))
+    table = scene.add_body(1.0, (1, 1, 1), velocity=(A * w, 0, 0))
+    slide = scene.add(C.Translational.at(scene.ground, table, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(C.TranslationMotor.of(slide, displacement=ts.motions.Sine(A, w)))
+    given = {"position": (0, 0, 0.1), "velocity": (A * w, 0, 0), "angular_velocity": (0, 0, spin)}
+    box = scene.add_body(**ts.shapes.box((0.4, 0.3, 0.2), mass=2.0), **given)
+    corners = [(x, y, -0.1) for x in (-0.2, 0.2) for y in (-0.15, 0.15)]
+    feet = [scene.add(C.PlaneContact(box, table, point_a=point, **FLOOR, kinetic=mu)) for point in corners]
+    solution = ts.simulate(scene, (0, end))
+    for foot in feet:
+        slip = solution.velocity(box, point=foot.point_a) - solution.velocity(table)
+        power = (solution.reaction(foot, on=box)[0] * slip * (1, 1, 0)).sum(axis=1)
+        assert power.max() < 1e-9
+    peak = mu * G * np.pi / (2 * w)
+    phase = (w * end - np.arccos(peak / (A * w))) % (2 * np.pi)  # since the velocity was largest
+    expected = abs(phase - np.pi) * mu * G / w - peak
+    assert abs(solution.velocity(box)[-1, 0] - expected) < 1e-3
+    assert np.abs(solution.angular_velocity(box)[-1]).max() < 1e-8
+
+
+@pytest.mark.parametrize("spin", [5e-4, 1e-3, 2e-3, 1e-2])
+def test_a_rod_that_turns_a_little_until_it_rests_stays_there(spin):
+    """It turns by 4e-8 to 2e-5 rad: the slip takes its direction anew before it ends, the same or another one."""
+    scene, L = ts.Scene(gravity=(0, 0, -G)), 1.0
+    given = {"position": (L / 2, 0, 0), "velocity": (0, spin * L / 2, 0), "angular_velocity": (0, 0, spin)}
+    rod = scene.add_body(1.0, (1e-3, L**2 / 12, L**2 / 12), **given, name="rod")
+    scene.add(C.Universal.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 0, 1), axis_b=(0, 1, 0)))
+    scene.add(C.PlaneContact(rod, scene.ground, point_a=(L / 2, 0, 0), **FLOOR, kinetic=0.2, name="floor"))
+    end = spin * (L**2 / 3) / (0.2 * G * L / 2)  # J w / (mu N L) with N = m g / 2
+    solution = ts.simulate(scene, (0, 3 * end), integrator="dop853")
+    assert abs(solution.phases[1][0] - end) < 1e-9 * end
+    assert solution.kinetic_energy[-1] == 0.0
+    assert np.diff(solution.kinetic_energy).max() <= 0.0

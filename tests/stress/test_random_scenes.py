@@ -14,7 +14,7 @@ from tsdyn.stress.random_scenes import CONTACTS, KINDS, Draw, drawn, generate
 
 
 def test_every_kind_is_drawn():
-    assert {generate(seed, 2, 6).name.partition(",")[0] for seed in range(400)} == set(KINDS)
+    assert {generate(seed, 2, 6).name.partition(",")[0] for seed in range(800)} == set(KINDS)
 
 
 def test_a_seed_is_a_scene():

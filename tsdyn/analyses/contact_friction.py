@@ -513,7 +513,9 @@ def shared(static, loads, p):
             slope[k] += rest - weight
             H = np.diag(squares) + way.T @ way - np.einsum("c,i,cij,cik->jk", share, metric, B, B)
             H[k, k] += rest * rest
-            step, h = -solve(H, slope), 1.0
+            step, h = solve(H, -slope), 1.0
+            if step is None:
+                break
             gain = -slope @ step
             while (found := value(y + h * step, weight)) > now - 0.1 * h * gain and h > EVENT_ERROR:
                 h *= 0.5

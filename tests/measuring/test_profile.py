@@ -306,8 +306,8 @@ def test_phases_of_a_run_with_impacts():
     scene = bouncing()
     found = ts.profile(scene, (0.0, 6.0))
     solution = found.solution
-    assert calls(found, "steps", "compiled driver") == solution.stats.steps
-    assert calls(found, "events", "searches of steps") == solution.stats.steps
+    flights = calls(found, "steps", "flights, with searches and impacts")  # the kernel leaves the step of each event
+    assert len(solution.impulses) <= calls(found, "events", "searches of steps") <= flights
     assert calls(found, "events", "impacts") == len(solution.impulses) > 30
     assert calls(found, "phases", "packed") == 2  # it flies, and rests: impacts end the slip
     assert sum(map(found.share, found.groups())) == pytest.approx(1.0)

@@ -124,7 +124,7 @@ def _least_squares(A, X, tau, f, order, limit):
 def solve(A, b):
     """x of A x = b, A (n, n), b (n,); None if A is singular or not finite."""
     x = np.array(b, float)
-    return x if _solve(np.array(A, float), np.empty(x.size, np.int64), x) else None
+    return x if _solve(np.array(A, float, order="C"), np.empty(x.size, np.int64), x) else None
 
 
 def least_squares(A, b, limit):
@@ -136,7 +136,7 @@ def least_squares(A, b, limit):
     (m, n), b = A.shape, np.asarray(b)
     X = np.zeros((max(m, n), *(b.shape[1:] or (1,))))
     X[:m] = b.reshape(m, X.shape[1])
-    _least_squares(np.array(A, float), X, np.empty(n), np.empty(max(X.shape)), np.empty(n, np.int64), limit)
+    _least_squares(np.array(A, float, order="C"), X, np.empty(n), np.empty(max(X.shape)), np.empty(n, np.int64), limit)
     return X[:n].reshape(n, *b.shape[1:])
 
 

@@ -57,11 +57,8 @@ def belt(u):
 @cache
 def motion(make, u):
     """Instants of phases, and places, in these units."""
-    scene, end = make(u)
-    method = ts.integrators.Taylor(rtol=1e-13, atol=1e-13 * min(u.length, u.length / u.time, 1.0))
-    solution = ts.simulate(scene, (0, end * u.time), integrator=method).raise_if_failed()
-    places = [solution.position(body)[-1] / u.length for body in scene.bodies]
-    return np.array([start for start, *_ in solution.phases]) / u.time, np.array(places)
+    solution, places = u.run(make, 1e-13)
+    return np.array([start for start, *_ in solution.phases]) / u.time, places
 
 
 @pytest.mark.parametrize(

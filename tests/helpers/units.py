@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 import tsdyn as ts
 
 C = ts.constraints
@@ -16,6 +18,13 @@ class Units(NamedTuple):
 
     def scene(self):
         return ts.Scene(gravity=(0, 0, -9.81 * self.length / self.time**2))
+
+    def run(self, make, tol):
+        """Run make(units), a scene and its end: the solution, and the last places of bodies in these units."""
+        scene, end = make(self)
+        method = ts.integrators.Taylor(rtol=tol, atol=tol * min(self.length, self.length / self.time, 1.0))
+        solution = ts.simulate(scene, (0, end * self.time), integrator=method).raise_if_failed()
+        return solution, np.array([solution.position(body)[-1] / self.length for body in scene.bodies])
 
     def floor(self, body, point, base=None, at=(0, 0, 0), **law):
         base = body.scene.ground if base is None else base

@@ -78,14 +78,11 @@ def joint(u):
 @cache
 def motion(make, u):
     """Phases, and times, impulses and places in these units, of a run whose tolerances have the units, too."""
-    scene, end = make(u)
-    method = ts.integrators.Taylor(rtol=1e-14, atol=1e-14 * min(u.length, u.length / u.time, 1.0))
-    solution = ts.simulate(scene, (0, end * u.time), integrator=method).raise_if_failed()
+    solution, places = u.run(make, 1e-14)
     found = solution.phases, solution.impulses
     times = [np.array([each[0] for each in some]) / u.time for some in found]
     p = np.array([float(each[2]) for each in solution.impulses]) * u.time / (u.mass * u.length)
-    places = [solution.position(body)[-1] / u.length for body in scene.bodies]
-    return [names for *_, names in found[0]], [name for _, name, _ in found[1]], *times, p, np.array(places)
+    return [names for *_, names in found[0]], [name for _, name, _ in found[1]], *times, p, places
 
 
 OTHERS = [

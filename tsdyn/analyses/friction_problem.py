@@ -20,6 +20,7 @@ from ..constraints.dot2 import Dot2
 from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
+from ..jit.kernels import twin
 from ..maths.complementarity import OPEN, STICKS
 from ..maths.dense_linalg import range_and_null_space
 from ..maths.dense_solve import least_squares, product
@@ -28,7 +29,7 @@ from ..model.handles import first_rows
 from ..model.packed import reach_of
 from ..observables.evaluate import ITERATIONS, constraint_arrays
 from ..observables.generalised_forces import applied_loads
-from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities
+from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities, within
 from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS, USUAL
 
 if TYPE_CHECKING:
@@ -211,18 +212,6 @@ class Frictions:
         A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
         still = LEVEL * (USUAL * paces) ** 2 / np.where(self.turns, 1.0, length or np.inf)
         return FrictionFrames(self, axes[0], A, paces, still)
-
-
-def within(v, ways, signed):
-    """Components of v (..., 3) along directions; in a plane, where not signed, zero where v is 60 degrees off.
-
-    v.d - |v - (v.d) d| / sqrt(3)
-
-    Of a slip that comes to rest without turning it is as smooth as v, which its size is not.
-    """
-    along = (v * ways).sum(axis=-1)
-    across = np.linalg.norm(v - along[..., None] * ways, axis=-1)
-    return along - np.where(signed, 0.0, across / np.sqrt(3.0))
 
 
 class FrictionFrames:
@@ -619,7 +608,7 @@ class RestProblem:
         found = {}
         for i, way in ways.items():
             at = self.at[i]
-            rate = within(a[at] @ self.bases[i], way, self.place.frictions.signed[i])
+            rate = twin(within)(a[at] @ self.bases[i], way, self.place.frictions.signed[i])
             found[i] = float(rate) if rate > small[at].max() else 0.0
         return found
 

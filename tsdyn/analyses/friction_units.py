@@ -1,5 +1,6 @@
 """Frictions at given states: slip velocities, normal loads, forces for unit loads; kernels, and their workspace."""
 
+import math
 import threading
 
 import numpy as np
@@ -83,6 +84,25 @@ def slip_velocity(q, qd, one, point, axis, v, n):
     for i in range(3):
         v[i] = along * n[i] if one[PART] == ALONG else v[i] - along * n[i]
     return size
+
+
+@kernel
+def within(v, d, signed):
+    """Component of v along a direction d; in a plane, where not signed, zero where v is 60 degrees off.
+
+    v.d - |v - (v.d) d| / sqrt(3)
+
+    Of a slip that comes to rest without turning it is as smooth as v, which its size is not.
+    """
+    along, square = 0.0, 0.0
+    for i in range(d.size):
+        along += v[i] * d[i]
+    if signed:
+        return along
+    for i in range(d.size):
+        across = v[i] - along * d[i]
+        square += across * across
+    return along - math.sqrt(square / 3.0)
 
 
 @entry("mmwvvmmm")

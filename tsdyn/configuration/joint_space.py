@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.bodies import rotation_matrix, transform_g
+from ..elements.bodies import euler_product, rotation_matrix, transform_g
 from ..elements.element import AngleGeometry
 from ..maths.tolerances import NEGLIGIBLE, SUM_ROUNDING, TINY
 from ..model import handles as joint_motion
@@ -217,12 +217,12 @@ class Loops:
         for level in tree.levels[1:]:
             above = tree.parents[level]
             shift[level] = shift[above] + _turned(o[above], shift[level])
-            o[level] = _product(o[above], o[level])
+            o[level] = euler_product(o[above], o[level])
         q, bodies = q.copy(), tree.bodies
         q[metric.r[bodies]] = centre + shift + _turned(o, q[metric.r[bodies]] - centre)
         rigid = metric.rigid[bodies]
         at = metric.at[bodies][rigid, None] + np.arange(3, 7)
-        p = _product(o[rigid], q[at])
+        p = euler_product(o[rigid], q[at])
         q[at] = p / np.linalg.norm(p, axis=1, keepdims=True)
         return q
 
@@ -324,12 +324,6 @@ def _exponential(twists):
 def _turned(o, x):
     """A(o) x, (k, 3)."""
     return np.einsum("kij,kj->ki", rotation_matrix(o), x)
-
-
-def _product(o, p):
-    """The Euler parameters (k, 4) of A(o) A(p)."""
-    e0 = o[:, :1] * p[:, :1] - (o[:, 1:] * p[:, 1:]).sum(axis=1, keepdims=True)
-    return np.concatenate((e0, o[:, :1] * p[:, 1:] + p[:, :1] * o[:, 1:] + np.cross(o[:, 1:], p[:, 1:])), axis=1)
 
 
 # A spanning tree of the bodies of a scene, and the constraints that close loops beside it.

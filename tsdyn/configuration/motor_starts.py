@@ -7,7 +7,7 @@ import numpy as np
 
 from ..constraints.rotation_motor import RotationMotor
 from ..constraints.thread import Thread
-from ..elements.bodies import IDENTITY, rotation_matrix
+from ..elements.bodies import IDENTITY, euler_product, rotation_matrix
 from ..elements.element import AngleGeometry
 from ..elements.loops.template import state
 from ..errors import InconsistentState, InvalidConstraint, SingularConfiguration
@@ -81,7 +81,7 @@ class RigidShift:
                 body.velocity = v + np.cross(omega, place - r) + R @ (xd - v - np.cross(omega, x - r))
                 body.position = place
                 if body.dimension == 7:
-                    body.orientation = _product(half, body.orientation)
+                    body.orientation = euler_product(half, body.orientation)
                     body.angular_velocity = rotation_matrix(body.orientation).T @ (omega + R @ (w - omega))
 
     def _line(self, goal):
@@ -122,11 +122,6 @@ def _motion(body):
         return np.zeros((3, 3))
     omega = rotation_matrix(body.orientation) @ body.angular_velocity if body.dimension == 7 else np.zeros(3)
     return body.position, body.velocity, omega
-
-
-def _product(p, o):
-    """The Euler parameters of A(p) A(o)."""
-    return np.append(p[0] * o[0] - p[1:] @ o[1:], p[0] * o[1:] + o[0] * p[1:] + np.cross(p[1:], o[1:]))
 
 
 # Motors at the start: how far their joints stand from the angle prescribed, and the way there.

@@ -367,6 +367,13 @@ def rotation_matrix(p: ArrayLike) -> Floats:
     return found if found.ndim == 2 else np.moveaxis(found, (0, 1), (-2, -1))
 
 
+def euler_product(p, o):
+    """The Euler parameters (..., 4) of A(p) A(o)."""
+    e0 = p[..., :1] * o[..., :1] - (p[..., 1:] * o[..., 1:]).sum(axis=-1, keepdims=True)
+    e = p[..., :1] * o[..., 1:] + o[..., :1] * p[..., 1:] + np.cross(p[..., 1:], o[..., 1:])
+    return np.concatenate((e0, e), axis=-1)
+
+
 def _components(p):
     """e0 to e3: numbers of Python, which are quicker, where there is one p."""
     p = np.asarray(p)

@@ -1,7 +1,6 @@
 """Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
-from bisect import bisect_left
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from ..elements.bodies import largest_of_kind, turning
 from ..errors import InvalidArgument, Status
 from ..jit.interrupts import deferred_interrupts
-from ..jit.kernels import resident
+from ..jit.kernels import resident, twin
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import all_angles, counted, handles_of
@@ -19,7 +18,7 @@ from ..observables.state import EventInstant
 from ..validation import demand, demand_arguments, demand_numbers, is_count, number
 from . import tolerances as limits
 from .event_groups import Group, GroupMember, States
-from .run_memory import Memory, end_run
+from .run_memory import Memory, end_run, is_at_stop
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
 
@@ -94,13 +93,7 @@ UNSEARCHED, UNBEGUN, NOT_BEGUN = 1, 2, 3  # how flights end: a step isn't search
 # States inside the last step of a run, for event location.
 
 ROOM = 64  # states that are kept
-
-
-def is_stop(log, t):
-    """Whether t is a stop, where loads may jump."""
-    stops = log.stops
-    i = bisect_left(stops, t, key=lambda stop: stop[0])
-    return i < len(stops) and stops[i, 0] == t
+at_stop = twin(is_at_stop)
 
 
 class Inside:
@@ -109,7 +102,7 @@ class Inside:
     def __init__(self, reader, run, log, start, spins):
         (self.t0, before, self.near), self.t1, self._spins = start, run.clock.t, spins
         self.memory = run.remembered[self.near.size :]
-        self.just = math.nextafter(self.t1, self.t0) if is_stop(log, self.t1) else self.t1
+        self.just = math.nextafter(self.t1, self.t0) if at_stop(run, log) else self.t1
         t0 = self.t0
         self.reader, self.steps = reader, (run.block, log.charts, log.points)
         self.known = {t0: before, self.t1: run.now.copy()}
@@ -300,7 +293,7 @@ class Watch:
                         return status, reason
             if answer is not None and status == Status.SLICE_DONE:
                 status = answer(log)
-            if unsearched and status == Status.SLICE_DONE and not self.begins_again and is_stop(log, self.t):
+            if unsearched and status == Status.SLICE_DONE and not self.begins_again and at_stop(run, log):
                 try:
                     last = self._cross_stop(run, log)
                 except EventFailed as failure:

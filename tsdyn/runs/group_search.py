@@ -404,11 +404,15 @@ def take_step(s):
 def search_step(search, context, run, first, second, before, now, block, charts, points):  # ten: a step
     """Search a step for the first zero: CLEAR, FOUND, or UNSURE, after which nothing has changed.
 
+    Of a step without zeros the values at its end are taken.
     context, run: of the reader; first, second: of the functions; before, now (3, n): states at t0 and t1. Of a zero the
     function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
     """
-    arrays, finder = StepArrays(before, now, block, charts, points), load_search(search).numbers.finder
-    return call_find(finder, search, context, run, first, second, seen(arrays))
+    arrays, s = StepArrays(before, now, block, charts, points), load_search(search)
+    found = call_find(s.numbers.finder, search, context, run, first, second, seen(arrays))
+    if found == CLEAR:
+        take_step(s)
+    return found
 
 
 @kernel
@@ -499,8 +503,7 @@ class GroupSearch:
     def find(self, step, is_new):
         """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure.
 
-        is_new: whether no step has been searched since the start. Of a step without zeros the values at its end are
-        taken.
+        is_new: whether no step has been searched since the start.
         """
         numbers, reader, known = self.numbers, step.reader, step.known
         numbers.t0, numbers.t1, (numbers.reader, context, run), numbers.new = step.t0, step.t1, reader.where, is_new
@@ -508,8 +511,6 @@ class GroupSearch:
         self._enter(step.near, step.memory)
         contexts = self.address, context, run, *self.contexts
         found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
-        if found == CLEAR:
-            self.parts.value[:], self.parts.odd[:] = self.parts.last, 0
-        elif found == FOUND:
+        if found == FOUND:
             known[numbers.t] = self.parts.state.copy()
         return None if found == UNSURE else numbers.found

@@ -160,6 +160,13 @@ def go_back(s, r, log):
 
 
 @kernel
+def is_at_stop(r, log):
+    """Whether the last step has ended at a stop, where loads may jump."""
+    i = r.numbers.next_stop
+    return (i < log.stops.shape[0] and log.stops[i, 0] == r.clock.t) or (i > 0 and log.stops[i - 1, 0] == r.clock.t)
+
+
+@kernel
 def end_step(r, log, t, start, state):
     """Let a run end at t, within the step that began at `start`, with a state (3, n) and what it remembers."""
     numbers, n = r.numbers, r.now.shape[1]

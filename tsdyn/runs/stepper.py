@@ -100,13 +100,6 @@ def next_stop(r, log):
 
 
 @kernel
-def is_at_stop(r, log):
-    """Whether the last step has ended at a stop."""
-    i = r.numbers.next_stop
-    return (i < log.stops.shape[0] and log.stops[i, 0] == r.clock.t) or (i > 0 and log.stops[i - 1, 0] == r.clock.t)
-
-
-@kernel
 def fixed_end(r, stop):
     """The end of the next step of fixed length, whether it is the run's last, and whether a stop cuts it.
 

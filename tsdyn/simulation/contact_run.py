@@ -90,14 +90,8 @@ FAILURES = {
 @cache
 def _compile_once(slides):
     """Have compiled what events need; slides: whether there is exact friction of joints."""
-    compile_ahead(
-        (
-            *contact_rows.KERNELS,
-            *contact_events.KERNELS,
-            *flights.KERNELS,
-            *((*friction_units.KERNELS, *unit_events.KERNELS) if slides else ()),
-        )
-    )
+    modules = contact_rows, contact_events, flights, *((friction_units, unit_events) if slides else ())
+    compile_ahead(tuple(kernel for module in modules for kernel in module.KERNELS))
 
 
 class _ContactRun(Transitions, Checkpoints):

@@ -21,8 +21,7 @@ from ..model.joint_turns import angle_after
 from ..runs.events import NOT_BEGUN, UNBEGUN, UNSEARCHED
 from ..runs.group_search import CLEAR, FOUND, StepArrays, begin_functions, call_find, load_search, take_step
 from ..runs.run_log import no_log
-from ..runs.run_memory import STATUSES, begin_again, call_driver, end_run, end_step, go_back, load_restart
-from ..runs.stepper import is_at_stop
+from ..runs.run_memory import STATUSES, begin_again, call_driver, end_run, end_step, go_back, is_at_stop, load_restart
 from ..runs.tolerances import LONG_STEPS, START_ZERO
 from ..workspaces import load_run
 from .tolerances import ACCUMULATED, EVENTS_JUDGED, FLIGHT, PENETRATION, PUSHED, ROUNDED
@@ -80,18 +79,10 @@ class Flight(NamedTuple):
 _none = np.zeros((0, 0))
 load_flight = loader(
     Flight(
-        FlightNumbers(),
-        np.zeros((0, 0), int),
-        *np.zeros((3, 0)),
-        _none,
-        *np.zeros((2, 0)),
-        _none,
-        np.zeros(0),
-        _none,
-        np.zeros(0),
-        _none,
+        FlightNumbers(), np.zeros((0, 0), int), *np.zeros((3, 0)), _none, *np.zeros((2, 0)), _none, np.zeros(0), _none,
+        np.zeros(0), _none,
     )
-)
+)  # fmt: skip
 
 
 @kernel

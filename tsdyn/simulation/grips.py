@@ -92,12 +92,11 @@ def slip_columns(contact, first):
 def carried(gaps, which, t, q, memory, N, T):
     """N (k, c) and friction (k, c, 2) of contacts that stick, where rows depend on others.
 
-    Friction is shared in proportion to N, but where reactions brace each other, see `braced`.
+    Friction is shared in proportion to N, but where reactions brace each other, see `shared`.
     """
     N, T = N.copy(), T.copy()
-    for k in np.flatnonzero(
-        np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)
-    ):  # else at singular ones N is NaN
+    depend = np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)  # at singular configurations N is NaN, too
+    for k in depend.nonzero()[0]:
         loads = gaps.responses(t[k], q[k], memory[k], which)
         p = shared(gaps.static[which], loads.reshape(3 * len(which), -1), np.column_stack([N[k], np.nan_to_num(T[k])]))
         N[k], T[k] = p[:, 0], p[:, 1:]

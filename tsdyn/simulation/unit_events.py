@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..analyses.contact_rows import GapCounts, OpenGaps, find_open_gaps, measure_opened, reaction_workspace, write_lam
-from ..analyses.friction_units import INTS, slip_velocity
+from ..analyses.friction_units import INTS, slip_velocity, within
 from ..analyses.tolerances import LEVEL
 from ..jit.kernels import callback, loader, matrix, resident, stack, vector
 from ..maths.tolerances import TINY
@@ -182,21 +182,19 @@ def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
     """out (units,): as of `Slowing`."""
     x = load_slowing(own)
     n, count = x.sizes[0], x.sizes[1]
-    now, values, v, axis = matrix(state, 3, n), vector(out, count), stack(3), stack(3)
+    now, values, v, axis, d = matrix(state, 3, n), vector(out, count), stack(3), stack(3), stack(3)
     for u in range(count):
         o, one = 3 * u, x.table[INTS * u : INTS * (u + 1)]
         slip_velocity(now[0], now[1], one, x.points[o : o + 3], x.axes[o : o + 3], v, axis)
-        d0, d1, d2 = x.memory[x.ways[o]], x.memory[x.ways[o + 1]], x.memory[x.ways[o + 2]]
-        if x.signed[u] != 0:
-            values[u] = d0 * (v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2])
-        else:
-            size = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-            size = size if size > 0.0 else 1.0
-            along, square = (v[0] * d0 + v[1] * d1 + v[2] * d2) / size, 0.0
-            for i in range(3):
-                across = v[i] - along * x.memory[x.ways[o + i]] / size
-                square += across * across
-            values[u] = along - math.sqrt(square / 3.0)
+        # The direction: a sign along the axis, or a vector
+        square = 0.0
+        for i in range(3):
+            d[i] = x.memory[x.ways[o + i]]
+            square += d[i] * d[i]
+        size = math.sqrt(square) if square > 0.0 else 1.0
+        for i in range(3):
+            d[i] = x.memory[x.ways[o]] * axis[i] if x.signed[u] != 0 else d[i] / size
+        values[u] = within(v, d, x.signed[u] != 0)
         begun, first, counts = x.begun[0, u], x.begun[1, u], x.begun[2, u]
         if begun < math.inf:
             values[u] = values[u] / (t - begun) if t > begun else first
@@ -208,7 +206,7 @@ def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
 class Slowing(KernelFunctions):
     """The velocities of frictions, along the directions in which they slide, as event functions.
 
-    In a plane a new direction is taken where it has turned by 60 degrees: `friction_problem.within`. The velocity of
+    In a plane a new direction is taken where it has turned by 60 degrees: `within`. The velocity of
     one that has just begun to slide is divided by the time since. Of one that is held without a force, what its
     velocity lacks of one that counts: a motor may begin to move it.
 

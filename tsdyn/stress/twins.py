@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..constraints import Translational, TranslationMotor
+from ..elements.bodies import euler_product
 from ..files.build import build, describe
 from ..files.scene_text import Places
 from ..files.types import Mistakes
@@ -48,8 +49,7 @@ class Mirror:
 
     def _turned(self, p):
         """Euler parameters of S A S0 = (S A S) (S S0)."""
-        (a, *u), (b, *v) = (p[0], *(-self.S @ p[1:])), self.turn
-        return np.array((a * b - np.dot(u, v), *(a * np.array(v) + b * np.array(u) + np.cross(u, v))))
+        return euler_product(np.append(p[0], -self.S @ p[1:]), self.turn)
 
     def _image(self, vector, S):
         return (S @ np.array(vector)).tolist()

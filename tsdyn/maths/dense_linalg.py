@@ -135,14 +135,14 @@ def null_space(W, n, m, V, R, tau):
                 W[i, j] /= head
         W[j, j] = s
         for c in range(j + 1, m):
-            _reflect(W, j, tau[j], W, c, n)
+            reflect(W, j, tau[j], W, c, n)
     # Q times the last unit vectors spans the complement
     for j in range(n - m):
         for i in range(n):
             V[i, j] = 0.0
         V[m + j, j] = 1.0
         for c in range(m - 1, -1, -1):
-            _reflect(W, c, tau[c], V, j, n)
+            reflect(W, c, tau[c], V, j, n)
     for i in range(m):
         for j in range(m):
             R[i, j] = W[i, j] if j >= i else 0.0
@@ -150,7 +150,8 @@ def null_space(W, n, m, V, R, tau):
 
 
 @kernel
-def _reflect(W, c, tau, X, j, n):
+def reflect(W, c, tau, X, j, n):
+    """Column j of X = (I - tau w w^T) X, w = (1, W[c+1:, c]) from row c on, of n rows."""
     s = X[c, j]
     for i in range(c + 1, n):
         s += W[i, c] * X[i, j]

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from ..jit.kernels import entry, kernel
-from .dense_linalg import lu, lu_solve, multiply
+from ..jit.kernels import entry
+from .dense_linalg import lu, lu_solve, multiply, reflect
 
 
 @entry("mwv")
@@ -19,23 +19,6 @@ def _solve(A, pivots, b):
 @entry("mmm")
 def _product(A, B, out):
     multiply(A, B, out)
-
-
-@kernel
-def _reflect(A, c, share, X, first, f):
-    """X = (I - share w w^T) X from its column `first` on, w = (1, A[c+1:, c]) from row c on; f: scratch, a row of X."""
-    m, n = X.shape
-    for j in range(first, n):
-        f[j] = X[c, j]
-    for i in range(c + 1, m):
-        for j in range(first, n):
-            f[j] += A[i, c] * X[i, j]
-    for j in range(first, n):
-        f[j] *= share
-        X[c, j] -= f[j]
-    for i in range(c + 1, m):
-        for j in range(first, n):
-            X[i, j] -= A[i, c] * f[j]
 
 
 @entry("mmvvwd")
@@ -69,8 +52,10 @@ def _least_squares(A, X, tau, f, order, limit):
         head = A[c, c] - pivot
         for i in range(c + 1, m):
             A[i, c] /= head
-        _reflect(A, c, -head / pivot, A, c + 1, f)
-        _reflect(A, c, -head / pivot, X[:m], 0, f)
+        for j in range(c + 1, n):
+            reflect(A, c, -head / pivot, A, j, m)
+        for j in range(k):
+            reflect(A, c, -head / pivot, X, j, m)
         A[c, c] = pivot
     # R = [T 0] Z of the first rows: reflectors of rows, (1, A[c, rank:]), from the last one on
     for c in range(rank - 1, -1, -1):

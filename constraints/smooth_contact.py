@@ -86,6 +86,11 @@ class SmoothContact(Primitive):
             )
         not_negative(self.tyre_radius, f"{self.name}: tyre_radius (m)", self.error)
 
+    @property
+    def reach(self):
+        """The largest semi-axis, and R, m."""
+        return float(floats(self.semi_axes).max()) + float(self.tyre_radius)
+
     def parameters(self):
         """(a_1^2, a_2^2, a_3^2, R, whether the plane moves)."""
         return (*(floats(self.semi_axes) ** 2).tolist(), float(self.tyre_radius), float(self.b.dimension > 0))

@@ -77,6 +77,11 @@ class SphereRolling(Primitive):
         if not 0.0 < number(self.distance) < np.inf:
             raise self.error(f"{self.name}: distance (m) of the centres must be positive, got {self.distance!r}.")
 
+    @property
+    def reach(self):
+        """The distance of the centres, m."""
+        return float(self.distance)
+
     def parameters(self):
         """(L, f, r_1, r_2, r_3), the last along h_j."""
         first, second = across(THIRD)

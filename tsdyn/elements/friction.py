@@ -52,13 +52,15 @@ def sliding(vv, par):
 
 @kernel
 def heading(v0, v1, v2, d, v_0):
-    """e = v / |v| while v is within 90 degrees of d (3,), and along d where |v| is far below v_0 |d|; zero where d is.
+    """e = v / |v| while v is within 90 degrees of d (3,), and along d where |v| is far below D = v_0 |d|; zero where d is.
 
-    u = d + (v d.d - d d.v) d.v / ((d.v)^2 + (v_0 d.d)^2),  e = u / |u|:  analytic at v = 0, and constant where v has
-    the direction of d, whatever its sign.
+    u = d d.d + (v d.d - d d.v) d.d v.v / ((v.v + D^2) sqrt((d.v)^2 + D^2 d.d)),  e = u / |u|:  analytic at v = 0, and
+    constant where v has the direction of d, whatever its sign. From D on it is against what v has across d, whatever
+    v has along it: a slip that begins across d gets the direction of its friction, and passes no 90 degrees.
     """
     a, b = v0 * d[0] + v1 * d[1] + v2 * d[2], d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    c = a / (a * a + v_0 * v_0 * b * b + TINY)
+    vv = v0 * v0 + v1 * v1 + v2 * v2
+    c = vv / (vv + v_0 * v_0 * b + TINY) / np.sqrt(a * a + v_0 * v_0 * b * b + TINY)
     u0, u1, u2 = d[0] + c * (b * v0 - a * d[0]), d[1] + c * (b * v1 - a * d[1]), d[2] + c * (b * v2 - a * d[2])
     size = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2 + TINY)
     return u0 / size, u1 / size, u2 / size
@@ -115,20 +117,27 @@ def direction_series(s, v, first, v_0, k):
     return scaled(s, v, first + 1, k)
 
 
-HEADING_ROWS = 11
+HEADING_ROWS = 15
 
 
 @kernel
 def heading_series(s, v, first, d, v_0, k):
     """Coefficient k, a tuple of three, of `heading`; v in rows v to v + 2 of s, HEADING_ROWS rows are its own."""
+    # a = d.v, (d.v)^2 + D^2 d.d, its inverse root, u (3), v d.d - d d.v (6), u.u, its inverse root, d.d over the root (11),
+    # v.v + D^2, their quotient, and what u has across d over (6)
     a, u, zero = first, first + 3, 1.0 if k == 0 else 0.0
     b = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    least = v_0 * v_0 * b + TINY
     s[a, k] = s[v, k] * d[0] + s[v + 1, k] * d[1] + s[v + 2, k] * d[2]
     s[a + 1, k] = square(s[a], k) + (v_0 * v_0 * b * b + TINY) * zero
-    s[a + 2, k] = quotient(s[a], s[a + 1], s[a + 2], k)
+    s[a + 2, k] = inverse_root(s[a + 1], s[a + 2], k)
+    s[first + 11, k] = b * s[a + 2, k]
+    s[first + 12, k] = dot(s, v, v, k) + least * zero
+    s[first + 13, k] = quotient(s[first + 11], s[first + 12], s[first + 13], k)
+    s[first + 14, k] = s[first + 11, k] - least * s[first + 13, k]
     for i in range(3):
         s[first + 6 + i, k] = b * s[v + i, k] - s[a, k] * d[i]
-        s[u + i, k] = d[i] * zero + product(s[first + 6 + i], s[a + 2], k)
+        s[u + i, k] = b * d[i] * zero + product(s[first + 6 + i], s[first + 14], k)
     s[first + 9, k] = dot(s, u, u, k) + TINY * zero
     s[first + 10, k] = inverse_root(s[first + 9], s[first + 10], k)
     return scaled(s, u, first + 10, k)

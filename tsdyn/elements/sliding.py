@@ -3,7 +3,7 @@
     n      normal towards a: z of the plane of b, or s (x_a - x_b) / |x_a - x_b| between balls, s = -1 within b
     k      = sum c_j e_j - R n,  c_j = -a_j^2 (e_j.n) / sqrt(sum a_i^2 (e_i.n)^2)                (1)
     v      = xd_a + omega_a x k - xd_b - omega_b x (x_a - x_b + k), less its part along n        (2)
-    force  = -mu N e,  e along u - n n.u,  u = d + (v d.d - d d.v) d.v / ((d.v)^2 + (d.d)^2)     (3)
+    force  = -mu N e,  e along u - n n.u,  u of friction.heading with D = |d|                    (3)
     dissipation = mu N e.v                                                                       (4)
 
 k is the contact point from x_a: an ellipsoid of semi-axes a_j along e_j, thickened by R. The force acts on a there, the
@@ -23,7 +23,7 @@ from ..jit.kernels import kernel
 from ..jit.predicates import some
 from ..maths.recurrences import cross, dot, inverse_root, product, scaled
 from .force import Force
-from .friction import TANGENTIAL_ROWS, heading, heading_series, tangential, tangential_series
+from .friction import HEADING_ROWS, TANGENTIAL_ROWS, heading, heading_series, tangential, tangential_series
 from .markers import Point, Turn, Vector
 
 MU, SIDE, AXES, TYRE, BALLS, WAY = 0, 1, 2, 5, 6, 7  # where these begin in par; then N
@@ -50,8 +50,8 @@ class _Sliding(Force):
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("b", "normal_b"))
     particles = True
     taken = 3
-    slots = 63 + TANGENTIAL_ROWS
-    positive = (53,)
+    slots = 52 + HEADING_ROWS + TANGENTIAL_ROWS
+    positive = (53, 64)
     sharp = True
     quantities: MappingProxyType[str, Any] = MappingProxyType({})
 
@@ -108,7 +108,7 @@ class _Sliding(Force):
         for i in range(3):
             s[22 + i, k] = s[18 + i, k] - off[i]
         u0, u1, u2 = heading_series(s, 22, 52, par[WAY : WAY + 3], 1.0, k)
-        e0, e1, e2 = tangential_series(s, 3, u0, u1, u2, 63, k)
+        e0, e1, e2 = tangential_series(s, 3, u0, u1, u2, 52 + HEADING_ROWS, k)
         s[27, k], s[28, k], s[29, k] = -par[MU] * e0, -par[MU] * e1, -par[MU] * e2
         n0, n1, n2 = cross(s, 12, 27, k)
         m0, m1, m2 = cross(s, 15, 27, k)

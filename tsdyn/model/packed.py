@@ -168,13 +168,15 @@ def size_of(primitives, coordinates):
     """Size of a scene: the largest number among the coordinates of markers; of a small one, the largest length, m."""
     largest = np.abs(np.array([s for places in coordinates for s in places]).reshape(-1, 3)).max(axis=1)
     codes = np.array([marker.code for primitive in primitives for marker in primitive.markers], int)
-    return _size(float(largest[codes == POINT].max(initial=0.0)), float(largest.max(initial=0.0)))
+    own = max((primitive.reach for primitive in primitives), default=0.0)
+    return _size(float(largest[codes == POINT].max(initial=own)), float(largest.max(initial=0.0)))
 
 
 def reaches_of(primitive, places):
-    """The largest numbers among the coordinates of points, and of all markers, of a primitive."""
+    """The largest numbers among the lengths, and among the coordinates of all markers, of a primitive."""
     sizes = [(marker.code, float(np.abs(s).max())) for marker, s in zip(primitive.markers, places, strict=True)]
-    return max((size for code, size in sizes if code == POINT), default=0.0), max((s for _, s in sizes), default=0.0)
+    lengths = [primitive.reach, *(size for code, size in sizes if code == POINT)]
+    return max(lengths), max((size for _, size in sizes), default=0.0)
 
 
 def reach_of(packed):

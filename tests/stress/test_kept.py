@@ -82,8 +82,20 @@ KEPT_CONTACTS = {
 }
 
 
+KEPT_SMALL = {
+    ("rough_ropes", 6000020): "velocities of 1e6 m/s end at an impact beside frictions",
+    ("rough_ropes", 6000021): "a friction that others hold without a force goes on to",
+    ("shaken", 6000183): "two rows of slips that nearly depend on each other don't hold a box",
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "seed"), KEPT_CONTACTS, ids=KEPT_CONTACTS.values())
-def test_a_kept_scene_with_contacts(kind, seed):
-    found = judge_case(drawn(np.random.default_rng(seed), 1, 5, {kind: CONTACTS[kind]}), ())
+@pytest.mark.parametrize(
+    ("kind", "seed", "most"),
+    [(*key, 5) for key in KEPT_CONTACTS] + [(*key, 3) for key in KEPT_SMALL],
+    ids=[*KEPT_CONTACTS.values(), *KEPT_SMALL.values()],
+)
+def test_a_kept_scene_with_contacts(kind, seed, most):
+    found = judge_case(drawn(np.random.default_rng(seed), 1, most, {kind: CONTACTS[kind]}), ())
+    assert found.word == str(Status.SUCCESS) or (kind, seed) in KEPT_CONTACTS
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"

@@ -244,7 +244,7 @@ class Transitions:
         key = frozenset(hold.key for hold in holds)
         if key not in self.held_gaps:
             free = self._scene_of([], holds)
-            start = (self.q.copy(), self.qd.copy()), self.t, self.options.initial_tol, self.remembered
+            start = (self.q.copy(), self.qd.copy()), self.t, self._tol(), self.remembered
             prepared(free).start(free, *start, True)  # finds redundant rows
             self.held_gaps[key] = gaps_of(self.scene, self.without, holds)
         return self.held_gaps[key]
@@ -286,8 +286,10 @@ class Transitions:
             slides = memory[unit.way].any()
             if i in before.blocked and slides:
                 guess[i] = place.read(i, memory)
-            stops = signed and i in fired and (slides or i not in before.blocked)  # a motor may begin to move others
-            if speed <= max(least[i], 0.0 if signed else STOPPED * paces[i]) or stops:
+            idle = i in before.blocked and not slides  # until a motor begins to move it
+            if idle or not signed:
+                least[i] = max(least[i], STOPPED * paces[i])
+            if speed <= least[i] or (signed and i in fired and not idle):
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:

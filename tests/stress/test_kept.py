@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from tsdyn.errors import Status
+from tsdyn.runs import driver
 from tsdyn.stress import judgement
 from tsdyn.stress.judgement import judge_case, run_case
+from tsdyn.stress.laws import same_bits
 from tsdyn.stress.random_scenes import CONTACTS, drawn, generate
 
 KEPT = {
@@ -99,3 +101,14 @@ def test_a_kept_scene_with_contacts(kind, seed, most):
     found = judge_case(drawn(np.random.default_rng(seed), 1, most, {kind: CONTACTS[kind]}), ())
     assert found.word == str(Status.SUCCESS) or (kind, seed) in KEPT_CONTACTS
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"
+
+
+@pytest.mark.slow
+def test_a_coin_that_becomes_stiff_turns_where_it_did_whatever_the_slices(monkeypatch):
+    """Its work counts from the start: slices end by the clock."""
+    case = drawn(np.random.default_rng(6000272), 1, 3, {"coins": CONTACTS["coins"]})
+    one = run_case(case)
+    assert "Radau took over" in one.message
+    assert same_bits(one, run_case(case, dense_output=False))  # longer slices
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
+    assert same_bits(one, run_case(case))

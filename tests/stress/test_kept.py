@@ -112,3 +112,10 @@ def test_a_coin_that_becomes_stiff_turns_where_it_did_whatever_the_slices(monkey
     assert same_bits(one, run_case(case, dense_output=False))  # longer slices
     monkeypatch.setattr(driver, "FIRST_SLICE", 4)
     assert same_bits(one, run_case(case))
+
+
+@pytest.mark.slow
+def test_a_phase_that_a_checkpoint_begins_knows_no_slips_of_the_one_before():
+    """Those that had been fast by then had ended: the first turn of a slip from rest came 0.13 s early."""
+    case = drawn(np.random.default_rng(6000008), 1, 3, {"shaken": CONTACTS["shaken"]})
+    assert judge_case(case, (judgement.stopped,)).word == str(Status.SUCCESS)

@@ -323,7 +323,7 @@ class _ContactRun(Transitions, Checkpoints):
         """Note how the run of a phase begins; let the archive know, and readers, and write a checkpoint that is due."""
         archive = self.archive
         if self.known is None:
-            self.first = self.t, self.q, self.qd, self.remembered
+            self.first, self.halting = (self.t, self.q, self.qd, self.remembered), None
         if archive is None:
             return
         archive.before = self.saved

@@ -244,7 +244,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
     small, carried = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)), inertia.carried()
-    mode = _sharing(G, b, p, mode, cones, response)
+    mode = _sharing(G, b, p, mode, cones, gaps.levers(inertia.q)[:, None] * response)
     moves, sizes = ((A @ x + y).reshape(-1, 3)[:, 1:] for A, x, y in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
     closed, idle, spare, grips, begun = [], [], [], {}, {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
@@ -445,7 +445,7 @@ def _held(inertia, closed, grips, b, small):
     braced = np.zeros(k, bool)
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
-        loads = inertia.free(rows_of(inertia, sticks).T).T
+        loads = inertia.free(rows_of(inertia, sticks).T).T * inertia.gaps.levers(inertia.q)
         before = pushes.copy()
         pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
         braced = pushes != before

@@ -87,6 +87,8 @@ KEPT_CONTACTS = {
 KEPT_SMALL = {
     ("rough_ropes", 6000020): "velocities of 1e6 m/s end at an impact beside frictions",
     ("rough_ropes", 6000021): "a friction that others hold without a force goes on to",
+    ("rough_ropes", 6000258): "a taut rope turns a joint with friction back at its dead centre",
+    ("rough_ropes", 6000263): "the same, where loads of the joint that would stick have no limit",
     ("shaken", 6000183): "two rows of slips that nearly depend on each other don't hold a box",
 }
 

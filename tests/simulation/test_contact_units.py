@@ -75,6 +75,19 @@ def joint(u):
     return scene, 4.0
 
 
+def shaken(u):
+    """A box on a table that is shaken slips and sticks; its corners share friction."""
+    scene, L, rate = u.scene(), u.length, 5.0 / u.time
+    table = scene.add_body(5 * u.mass, np.ones(3) * u.mass * L**2)
+    box = scene.add_body(**ts.shapes.box(L * np.array((0.4, 0.3, 0.2)), mass=u.mass), position=(0, 0, 0.1 * L))
+    table.velocity = box.velocity = (0.15 * L * rate, 0, 0)
+    slide = scene.add(C.Translational.at(scene.ground, table, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(C.TranslationMotor.of(slide, displacement=ts.motions.Sine(0.15 * L, rate)))
+    for x, y in CORNERS:
+        u.floor(box, L * np.array((0.2 * x, 0.15 * y, -0.1)), table, kinetic=0.25, static=0.3)
+    return scene, 1.0
+
+
 @cache
 def motion(make, u):
     """Phases, and times, impulses and places in these units, of a run whose tolerances have the units, too."""
@@ -95,6 +108,17 @@ OTHERS = [
 @pytest.mark.parametrize("make", [stack, dominoes, rope, stick_slip, joint], ids=lambda make: make.__name__)
 @pytest.mark.parametrize("units", OTHERS, ids=lambda units: "{:g} m, {:g} kg, {:g} s".format(*units))
 def test_other_units_change_nothing(make, units):
+    demand_same(make, units)
+
+
+def test_corners_share_friction_within_their_cones_in_small_units():
+    """Turning accelerations are 1e8 times the others; the first slip begins at 0.3 of the weight."""
+    demand_same(shaken, Units(1e-8, 1e9, 1e3))
+    starts = motion(shaken, Units())[2]
+    np.testing.assert_allclose(0.15 * 25.0 * np.sin(5.0 * starts[1]), 0.3 * 9.81, rtol=1e-12)
+
+
+def demand_same(make, units):
     """To rounding: of the last times of an accumulation, 1e-16 over the flights; of what redundant feet share.
 
     Slip that turns to its end keeps its direction below 3e-7 of the velocities: it ends right to some share of that.

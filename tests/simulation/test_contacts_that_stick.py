@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tsdyn.configuration.mobility import mobility_at
+from tsdyn.simulation.contact_run import begun
 
 C = ts.constraints
-G = 9.81  # m/s^2
+G, Z = 9.81, (0, 0, 1)  # m/s^2
 
 
 @pytest.mark.parametrize("angle", [0.2, 0.4])
@@ -50,3 +52,23 @@ def test_a_light_box_slips_on_a_plate_that_shakes(mu):
     assert abs(solution.phases[0][1] - begin) < 1e-14
     speed = 0.5 * np.cos(10.0 * begin) - mu * G * (0.1 - begin)
     np.testing.assert_allclose(solution.velocity("box")[-1], [speed, 0, 0], rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 5e-4, 1e-3])
+def test_rows_that_hold_a_box_are_independent_by_far(yaw):
+    """A slip along an edge, between two corners of it, is none by a second row but for the yaw."""
+    scene, size = ts.Scene(), np.array((0.4, 0.3, 0.2))
+    box = scene.add_body(**ts.shapes.box(size, mass=2.0), position=(0, 0, 0.1))
+    box.orientation = np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)
+    for corner in ((-1, -1, -1), (-1, 1, -1), (1, -1, -1), (1, 1, -1)):
+        at = {"point_a": size / 2 * corner, "normal_b": Z, "unilateral": True, "kinetic": 0.3}
+        scene.add(C.PlaneContact(box, scene.ground, **at))
+    scene.add(ts.forces.PointForce(box, point_a=(-0.15, 0, 0.1), force=(0, 0, -30.0)))
+    run = begun(scene, 0.0)
+    gaps, closed, grips = run.gaps, run.modes.closed, run.modes.grips
+    slips = gaps.slopes(0.0, run.q, closed)
+    held = [slips[k][j] for k, i in enumerate(closed) for j in range(2) if grips[i][j]]
+    rows = np.array([*gaps.normals(0.0, run.q, closed), *held, np.append(np.zeros(3), run.q[3:])])
+    assert np.linalg.cond(rows / np.linalg.norm(rows, axis=1)[:, None]) < 20.0
+    # With the points where corners are held, which the run remembers
+    assert mobility_at(run._scene(), run.q, 0.0, run.filled().packed.system).degrees_of_freedom == 0

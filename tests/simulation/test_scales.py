@@ -240,3 +240,20 @@ def test_a_box_comes_to_rest_where_it_does_at_the_origin(place, tmp_path):
     again = ts.load(tmp_path / "rest.h5", scene)
     np.testing.assert_array_equal(again.at(50.0).position(box), run.at(50.0).position(box))
     assert run.constraint_error.position.max() <= 1e-15 + ROUNDING * np.abs(place).max()
+
+
+@pytest.mark.parametrize("L", [1.0, 7e5])
+def test_a_rope_stops_a_pendulum_with_friction_alike_in_all_units(L):
+    """Where the rope is taut, by its geometry; rounding of 1e7 m/s is no velocity that breaks a constraint."""
+    scene, lean = ts.Scene(gravity=(0.0, 0.0, -200.0 * L)), 0.5
+    inertia = 0.01 * L * L * np.ones(3)
+    bob = scene.add_body(1.0, inertia, (L, 0.0, 0.0), Rotation.from_rotvec((0.1, -0.1, 0.6)))
+    hinge = scene.add(C.Revolute.at(scene.ground, bob, point=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0)))
+    friction = scene.add(F.RevoluteFriction(hinge, radius=0.1 * L, kinetic=0.6))
+    ends = [(scene.ground, (0.0, 0.0, 0.5 * L)), (bob, (0.0, 0.0, 0.0))]
+    scene.add(C.Rope(ends, length=L * np.sqrt(1.25 + np.sin(lean))))
+    solution = ts.simulate(scene, (0.0, 0.3), integrator="taylor").raise_if_failed()
+    assert solution.sticking(friction)[-1]
+    place = L * np.array((np.cos(lean), 0.0, -np.sin(lean)))
+    np.testing.assert_allclose(solution.position(bob)[-1], place, rtol=0.0, atol=1e-9 * L)
+    assert np.abs(solution.qd[-1]).max() <= 1e-12 * np.abs(solution.qd).max()

@@ -19,7 +19,7 @@ from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, product, solve
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
-from .tolerances import AHEAD, EVENT_ERROR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
+from .tolerances import AHEAD, EVENT_ERROR, FAR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
 
 # Of `shared`: weights of the margin, most steps at each, the gain that ends them; shares of the largest reaction, of
 # the margin that is deep and of what the end of the path is right to, where some reactions are zero
@@ -244,7 +244,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
     small, carried = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)), inertia.carried()
-    mode = _sharing(G, b, p, mode, cones, response)
+    mode = _sharing(G, b, p, mode, cones, gaps.levers(inertia.q)[:, None] * response)
     moves, sizes = ((A @ x + y).reshape(-1, 3)[:, 1:] for A, x, y in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
     closed, idle, spare, grips, begun = [], [], [], {}, {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
@@ -305,16 +305,19 @@ def _independent(inertia, closed, grips):
     if not sticks:
         return {}
     rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), -1)])
-    loads, kept = inertia.free(rows.T).T, np.ones(len(rows), bool)
-    held = RANK_TOL**2 * (rows * loads).sum(axis=1).max()  # by bilateral rows
-    for k in range(len(rows)):  # Gram-Schmidt in the metric of kinetic energy
-        size, before = rows[k] @ loads[k], np.flatnonzero(kept[:k])
+    loads, kept = inertia.free(rows.T).T, np.zeros(len(rows), bool)
+    sizes = (rows * loads).sum(axis=1)
+    held = RANK_TOL**2 * sizes.max()  # by bilateral rows
+    # Gram-Schmidt in the metric of kinetic energy: rows that are independent by far come first
+    for k, share in [(k, share) for share in (FAR, RANK_TOL) for k in range(len(rows))]:
+        if kept[k]:
+            continue
         for _ in range(2):  # as classical Gram-Schmidt is right to rounding
-            shares = loads[before] @ rows[k]
-            rows[k] -= shares @ rows[before]
-            loads[k] -= shares @ loads[before]
+            shares = loads[kept] @ rows[k]
+            rows[k] -= shares @ rows[kept]
+            loads[k] -= shares @ loads[kept]
         left = rows[k] @ loads[k]
-        kept[k] = k < len(closed) or left > max(RANK_TOL * size, held)
+        kept[k] = k < len(closed) or left > max(share * sizes[k], held)
         if kept[k]:
             rows[k] /= np.sqrt(max(left, TINY))
             loads[k] /= np.sqrt(max(left, TINY))
@@ -442,7 +445,7 @@ def _held(inertia, closed, grips, b, small):
     braced = np.zeros(k, bool)
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
-        loads = inertia.free(rows_of(inertia, sticks).T).T
+        loads = inertia.free(rows_of(inertia, sticks).T).T * inertia.gaps.levers(inertia.q)
         before = pushes.copy()
         pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
         braced = pushes != before

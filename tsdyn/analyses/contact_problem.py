@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
+from ..elements.bodies import turning
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.dense_solve import least_squares, product
@@ -106,6 +107,10 @@ class Gaps:
         """The scene's length at q (n,), m: of points and positions the one farthest off; where there is none, one."""
         length = max(self._reach, float(np.linalg.norm(q[self._places], axis=1).max(initial=0.0)))
         return length if length > NEGLIGIBLE * self.packed.size else self.packed.size
+
+    def levers(self, q):
+        """Lengths for units of coordinates (n,): one, and for Euler parameters the scene's length at q, m."""
+        return np.where(turning(self.packed.system.bodies, q.size), self.extent(q), 1.0)
 
     def lengths(self, length):
         """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound.

@@ -29,6 +29,7 @@ from ..model.handles import first_rows
 from ..model.packed import reach_of
 from ..observables.evaluate import ITERATIONS, constraint_arrays
 from ..observables.generalised_forces import applied_loads
+from .contact_problem import NoSolution
 from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities, within
 from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS, USUAL
 
@@ -483,10 +484,11 @@ class RestProblem:
         self.normal_loads, self.pressed = N, pushing[np.column_stack([closed, rests, rests]).ravel()]
         return y, N
 
-    def pivot(self, ways, fired):
+    def pivot(self, ways, fired, turned):
         """The `FrictionAtRest` of the units, by pivoting from a guess: directions of those that slide.
 
-        fired: units whose reactions have just reached their bounds. Raises `NoRest`.
+        fired: units whose reactions have just reached their bounds; turned: directions of units along an axis that
+        have just ended a slip, if they go on through. Raises `NoRest`.
         """
         fired, seen, judged, guessed = set(fired), set(), set(), False
         self.light, self.idle, self.engaged = set(self.rows), [], set()
@@ -494,7 +496,13 @@ class RestProblem:
         ways = {i: way for i, way in ways.items() if i not in self.light}
         for count in range(PIVOTS * (1 + len(self.rows))):
             self.idle = self._idle(ways)
-            x, N = self.solve(ways)
+            try:
+                x, N = self.solve(ways)
+            except (NoRest, NoSolution):  # a joint that a taut rope turns back at a dead centre can't stick
+                if not turned:
+                    raise
+                ways, turned = {**ways, **{i: way for i, way in turned.items() if i not in self.light}}, {}
+                continue
             a = self.c + self.G @ x + self.D @ N
             small = self._rounding(x, N)
             wrong = self._wrong(ways, x, N, a, small, fired)

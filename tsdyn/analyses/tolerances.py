@@ -136,6 +136,9 @@ AHEAD = 3e-7
 SLOWEST_SLIP, LEAST_SLIP = 1e-2, 1e-5
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
+# Square of the sine of the angle between a slip of a contact that sticks and the rows that hold, above which it is
+# independent of them by far.
+FAR = 1e-2
 # Rounding of a gap that has just opened, over its rate times the time since, from which on its rate counts beside it:
 # flights above rounding end at 1/16.
 JUST_OPENED = 1.0 / 14.0

@@ -620,7 +620,7 @@ class _Start:
         """What to say of a configuration in which rows, by name, are dependent that don't hold nearby."""
         found, counts = None, ""
         with suppress(InvalidArgument):  # too large
-            found = mobility_at(self.scene, self.q, self.t)
+            found = mobility_at(self.scene, self.q, self.t, self.given[1])
         if found is not None and found.singular:
             real, free = int((self.graph.row >= 0).sum()), found.degrees_of_freedom
             counts = (
@@ -641,7 +641,7 @@ class _Start:
         joints = np.flatnonzero(graph.row >= 0)
         if q.size * joints.size > limits.DENSE_ENTRIES or graph.welds.size:
             return np.empty(0, int)
-        A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][graph.row[joints]]
+        A = constraint_arrays(self.given[1], q, self.qd, self.t)[1][graph.row[joints]]
         for at in self.at:  # without the component along p, which the normalisations hold
             A[:, at] -= np.outer(A[:, at] @ q[at], q[at])
         return joints[np.sort(dependent(A * coordinate_scales(self.packed)))]

@@ -312,9 +312,9 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
     return mobility_at(scene, q, float(t))
 
 
-def mobility_at(scene, q, t):
-    """As `mobility`, of arguments that are checked."""
-    packed = scene.packed
+def mobility_at(scene, q, t, system=None):
+    """As `mobility`, of arguments that are checked; system: in place of the scene's, with what a run remembers."""
+    packed = scene.packed if system is None else scene.packed._replace(system=system)
     metric = Metric(packed, None, t, lengths=True, rates=True)
     Phi, Phi_q, Phi_t = metric.arrays(q)
     demand_finite(scene, Phi, Phi_q, Phi_t)

@@ -77,6 +77,7 @@ class Checkpoints:
             if "reached" in known:
                 demand(arrays["last"].shape == (3, n), "the end of a phase")
                 self.end = RunEnd(known["reached"], arrays["last"], arrays["ended"], self.totals, None, None)
+                self.ended, self.qdd = self.end.last[1:]
             for i, found in enumerate(self.found):
                 found.append(tuple(arrays[f"event {i}.{name}"] for name in ("t", "q", "qd")))
 

@@ -13,7 +13,7 @@ from ..ahead import compile_ahead
 from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
 from ..analyses.friction_problem import Frictions, Hold, hold_of, immobile
-from ..analyses.tolerances import STOPPED
+from ..analyses.tolerances import RESTS, STOPPED
 from ..configuration.initial_conditions import DependentRows
 from ..elements.unilateral import contacts_of
 from ..errors import (
@@ -27,7 +27,7 @@ from ..errors import (
 from ..integrators import DOP853
 from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
-from ..maths.tolerances import NEGLIGIBLE
+from ..maths.tolerances import EPS, NEGLIGIBLE
 from ..model.handles import handles_of
 from ..observables import diagnostics
 from ..observables.state import remembered
@@ -290,7 +290,7 @@ class _ContactRun(Transitions, Checkpoints):
         Where that takes open gaps below zero, as rounding can, these close first.
         """
         for _ in range(self.gaps.count + 1):
-            phase = self._scene()
+            phase = self._scene(tol)
             run, call = self._run_of(phase)
             task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
             sunk = [] if self.known is not None else self._sunk(task.q)
@@ -313,16 +313,17 @@ class _ContactRun(Transitions, Checkpoints):
         return [i for i in self.able if values[i] < 0.0 and i not in held]
 
     def _tol(self):
-        """Of the start of a phase: velocities after an impact have the rounding of those before it."""
-        last = self.qd if self.end is None else self.end.last[1]
+        """Of the start of a phase: velocities after an impact have the rounding of those before it, and of its time."""
+        last = self.qd if self.ended is None else self.ended
         before, after = (1.0 + np.abs(qd).max() for qd in (last, self.qd))
-        return self.options.initial_tol * max(1.0, before / after)
+        rounding = RESTS * EPS * abs(self.t) * np.abs(self.qdd).max()
+        return max(self.options.initial_tol * max(1.0, before / after), rounding / after)
 
     def _enter_archive(self):
         """Note how the run of a phase begins; let the archive know, and readers, and write a checkpoint that is due."""
         archive = self.archive
         if self.known is None:
-            self.first = self.t, self.q, self.qd, self.remembered
+            self.first, self.halting = (self.t, self.q, self.qd, self.remembered), None
         if archive is None:
             return
         archive.before = self.saved
@@ -396,12 +397,12 @@ class _ContactRun(Transitions, Checkpoints):
         self.remembered = flown.parts.noted.copy()
         self.judged = self.judged[0], self.judged[1] + flown.numbers.impacts
 
-    def _scene(self):
-        """The scene of the present modes."""
+    def _scene(self, tol=None):
+        """The scene of the present modes; tol: as of `_tol`, by default of the present velocities."""
         if self.switches and self.every and not self.modes.grips:
             phase, start = self._phase_of_modes(self.every), (self.q, self.qd)
             with suppress(DependentRows):
-                prepared(phase).start(phase, start, self.t, self.options.initial_tol, self.remembered, True)
+                prepared(phase).start(phase, start, self.t, tol or self._tol(), self.remembered, True)
                 return phase
         return self._phase_of_modes()
 

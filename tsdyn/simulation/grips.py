@@ -97,7 +97,7 @@ def carried(gaps, which, t, q, memory, N, T):
     N, T = N.copy(), T.copy()
     depend = np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)  # at singular configurations N is NaN, too
     for k in depend.nonzero()[0]:
-        loads = gaps.responses(t[k], q[k], memory[k], which)
+        loads = gaps.responses(t[k], q[k], memory[k], which) * gaps.levers(q[k])
         p = shared(gaps.static[which], loads.reshape(3 * len(which), -1), np.column_stack([N[k], np.nan_to_num(T[k])]))
         N[k], T[k] = p[:, 0], p[:, 1:]
     return N, T

@@ -119,9 +119,10 @@ class Turns:
         """Whether the run turns to the other method where its memory is."""
         run = memory.run
         steps, t = run.numbers.steps, run.clock.t
-        if steps < self.ask:
-            return False
         to_explicit = memory.engine.method.implicit
+        # Slices end by the clock, too: work is measured from where a method was considered before
+        if steps < self.ask or not (to_explicit or self.tried or run.numbers.stiff):
+            return False
         work = self._cost * memory.work.counters.evaluations if to_explicit else self._step * steps
         (before, done), self.window = self.window, (t, work)
         rate = (work - done) / (t - before) if t > before else 0.0

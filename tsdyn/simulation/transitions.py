@@ -244,7 +244,7 @@ class Transitions:
         key = frozenset(hold.key for hold in holds)
         if key not in self.held_gaps:
             free = self._scene_of([], holds)
-            start = (self.q.copy(), self.qd.copy()), self.t, self.options.initial_tol, self.remembered
+            start = (self.q.copy(), self.qd.copy()), self.t, self._tol(), self.remembered
             prepared(free).start(free, *start, True)  # finds redundant rows
             self.held_gaps[key] = gaps_of(self.scene, self.without, holds)
         return self.held_gaps[key]
@@ -275,7 +275,7 @@ class Transitions:
         place = frictions.at(self.q, paces, self.length)
         least = np.maximum(NEGLIGIBLE * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
         least = np.maximum(least, EVENT_ERROR * np.minimum(sizes, (self.t - self.span[0]) * rates))
-        self.remembered, resting, guess = self.remembered.copy(), [], {}
+        self.remembered, resting, guess, turned = self.remembered.copy(), [], {}, {}
         memory = self.remembered[count:]  # a part of it
         self.modes.blocked = self.off
         self.modes.limits = {i: x for i, x in before.limits.items() if i not in (*fired, *before.sticking)}
@@ -286,16 +286,20 @@ class Transitions:
             slides = memory[unit.way].any()
             if i in before.blocked and slides:
                 guess[i] = place.read(i, memory)
-            stops = signed and i in fired and (slides or i not in before.blocked)  # a motor may begin to move others
-            if speed <= max(least[i], 0.0 if signed else STOPPED * paces[i]) or stops:
+            idle = i in before.blocked and not slides  # until a motor begins to move it
+            if idle or not signed:
+                least[i] = max(least[i], STOPPED * paces[i])
+            if speed <= least[i] or (signed and i in fired and not idle):
                 resting.append(i)
+                if signed and slides:
+                    turned[i] = -place.read(i, memory)
                 memory[unit.way] = 0.0
             else:
                 memory[unit.way] = place.written(i, v[0, i] / speed)
         if not resting and cones is None:
             return None
         try:
-            rest, ranks, packed = self._rest(place, before, resting, guess, fired, cones)
+            rest, ranks, packed = self._rest(place, before, resting, (guess, turned), fired, cones)
         except NoRest as error:
             names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
             self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
@@ -325,7 +329,7 @@ class Transitions:
         memory[0, [slot for unit in self.frictions.units for slot in range(unit.way.start, unit.way.stop)]] = 0.0
         return (found - force_loads(system, np.array([self.t]), *motion, memory))[0]
 
-    def _rest(self, place, before, resting, guess, fired, cones):
+    def _rest(self, place, before, resting, guesses, fired, cones):
         """The `FrictionAtRest`, how many rows hold each at rest, and the packed phase with open contacts."""
         units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
         for i in resting:
@@ -346,7 +350,8 @@ class Transitions:
                     memory[units[i].held(k)[-1]] = Phi[row]
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
         problem = RestProblem(place, self.gaps, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
-        rest = problem.pivot({i: way for i, way in guess.items() if i in free}, fired)
+        guess, turned = ({i: way for i, way in each.items() if i in free} for each in guesses)
+        rest = problem.pivot(guess, fired, turned)
         # In a plane slips end where they are slow; elsewhere where they are more than a start may leave
         ends = [i for i in rest.sticking if i in fresh and not self.frictions.signed[i]]
         if problem.slip([i for i in rest.sticking if i in fresh], self.qd) > 0.5 * self.options.initial_tol:

@@ -159,6 +159,7 @@ def test_a_damaged_file_of_numba_is_told_and_compiled_again(tmp_path):
         assert run(TINY, environment)[0]["misses"] == 0
 
 
+@pytest.mark.slow
 def test_an_unknown_way_is_told(tmp_path):
     found, errors = run(TINY, {"TSDYN_JIT": "stok"})
     assert found["value"] == 2.0

@@ -273,6 +273,7 @@ def later(t, state):
     return (lambda: (0.0, 0.0, t))()
 
 
+@pytest.mark.slow
 def test_what_doesnt_read_the_time_is_not_sampled():
     scene = ts.Scene()
     body = scene.add_point_mass(1.0)

@@ -244,7 +244,7 @@ OTHER = {
 }  # fmt: skip
 
 
-@pytest.mark.slow_for("sdirk54")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [None, "taylor", "dop853", "sdirk54"])
 def test_numbers_of_functions_of_the_state(method):
     scene = ruled_by_functions()

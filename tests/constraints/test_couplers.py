@@ -89,6 +89,7 @@ def test_a_differential(options):
     assert scene.mobility().degrees_of_freedom == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [3, 12, 40])
 def test_a_train_of_wheels_on_a_carrier(count):
     """Each wheel turns by -0.9 of the one before, on axes that alternate: the carrier is a hub of many rows."""
@@ -205,7 +206,7 @@ def crane(function, axes=(Z, X)):
     return scene, joints
 
 
-@pytest.mark.slow_for("*sdirk54*", "*radau*", "*null-space*")
+@pytest.mark.slow_for("*sdirk54*", "*radau*", "*null-space*", "taylor")
 @every_method
 def test_a_product_of_two_angles_against_lagrange(options):
     """(J + m g g^T) q'' = -m g (q'^T G q' + 9.81), g and G the first and second derivatives of the lift."""

@@ -57,6 +57,7 @@ def test_trailers_run_on_circles(count):
     assert solution.constraint_error.velocity.max() < 1e-12
 
 
+@pytest.mark.slow
 def test_trailers_cost_in_proportion_to_their_number():
     assert entries(400) < 4.1 * entries(100)
 

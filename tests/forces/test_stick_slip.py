@@ -169,6 +169,7 @@ def test_a_reversal_without_rest():
     np.testing.assert_allclose(solution.position("block")[-1], way * along, atol=FINE)
 
 
+@pytest.mark.slow_for("0.0-0.0")
 @pytest.mark.parametrize(("start", "end"), [(0.0, 0.0), (0.9, 0.0), (1.1, None)])
 def test_a_start_at_rest_sticks_by_the_static_bound(start, end):
     """A torque that static friction holds, or not: a wheel with CoulombFriction of a given torque."""

@@ -105,7 +105,7 @@ ctypes.CFUNCTYPE = lambda *types: (lambda address: lambda i: 40) if types == (ct
 
 
 @pytest.mark.skipif(compilers.current() is stock, reason="nothing private is used")
-@pytest.mark.slow_but("a pass", "a test that gives another number")
+@pytest.mark.slow_but("a pass")
 @pytest.mark.parametrize("gone", GONE)
 def test_where_something_is_gone_numba_as_it_comes_serves(gone, tmp_path):
     """With one warning; parts that are used by compilation alone need an empty cache."""

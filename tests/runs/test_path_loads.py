@@ -113,7 +113,7 @@ def wall(t, state, *, at=0.9, stiffness=1e5):
     return (-state[0] - stiffness * max(0.0, state[0] - at), 0.0, 0.0)
 
 
-@pytest.mark.slow_but("*dop853", "*rk45")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STAGES)
 def test_a_wall_that_an_oscillation_grazes(name):
     """x = sin t meets a wall at cos(w / 2), and leaves it after a half period of the wall's spring, w being 0.02."""

@@ -87,7 +87,7 @@ def test_series_of_loads_are_those_of_their_laws(make):
     ts.testing.check_force(make)
 
 
-@pytest.mark.slow_for(*SLOW, "arrays")
+@pytest.mark.slow_for(*SLOW, "arrays", "user")
 @pytest.mark.parametrize("make", LOADS.values(), ids=LOADS)
 def test_motions_by_series_are_those_by_stages(make):
     scene, link = arm()

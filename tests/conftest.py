@@ -24,6 +24,12 @@ def rng(request):
     return np.random.default_rng(zlib.crc32(request.node.name.encode()))
 
 
+@pytest.fixture
+def few_objects():
+    """Leave what there is, a million objects, out of further garbage collections: one in the test takes no second."""
+    gc.freeze()
+
+
 def pytest_sessionstart(session):
     """Compile by all processors what most tests need, so that no worker of pytest-xdist waits for another's kernel."""
     config = session.config

@@ -125,6 +125,7 @@ def test_constant_torque(torque):
     assert found.state.angle("pin 0") == pytest.approx(np.arcsin(torque / moment), rel=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_ziegler_column_flutters(share):
     """Masses 2 m and m, springs k, a follower load P at the tip: flutter from (7 / 2 - sqrt 2) k / l on."""

@@ -265,6 +265,7 @@ def test_motion_that_is_not_finite_ends_the_analysis():
     assert found.t.tolist() == [0.0, 0.5]
 
 
+@pytest.mark.slow
 def test_cost_is_linear_in_the_bodies():
     scene = chain_of_motors(300)
     found = scene.kinematics(np.linspace(0.0, 1.0, 3))

@@ -56,6 +56,7 @@ def test_inverted_pendulums(angles):
     assert found.real.max() > 1.0
 
 
+@pytest.mark.slow_for("0", "1")
 @pytest.mark.parametrize("seed", range(6))
 def test_derivatives_in_any_motion(seed):
     rng = np.random.default_rng(seed)

@@ -173,6 +173,7 @@ def facts(scene):
 exponents = st.lists(st.floats(-15.0, 15.0), min_size=2, max_size=5)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10**6), powers=exponents)
 def test_masses_change_no_mobility(seed, powers):

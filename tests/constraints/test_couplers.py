@@ -89,6 +89,7 @@ def test_a_differential(options):
     assert scene.mobility().degrees_of_freedom == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [3, 12, 40])
 def test_a_train_of_wheels_on_a_carrier(count):
     """Each wheel turns by -0.9 of the one before, on axes that alternate: the carrier is a hub of many rows."""
@@ -205,7 +206,7 @@ def crane(function, axes=(Z, X)):
     return scene, joints
 
 
-@pytest.mark.slow_for("*sdirk54*", "*radau*", "*null-space*")
+@pytest.mark.slow_for("*sdirk54*", "*radau*", "*null-space*", "taylor")
 @every_method
 def test_a_product_of_two_angles_against_lagrange(options):
     """(J + m g g^T) q'' = -m g (q'^T G q' + 9.81), g and G the first and second derivatives of the lift."""
@@ -271,7 +272,7 @@ def test_a_function_of_angles_and_travels_in_a_chain():
     assert (again.q == ts.simulate(crane(lift)[0], (0.0, 1.0)).q).all()
 
 
-@pytest.mark.slow_for("dd", "ada", "da")
+@pytest.mark.slow
 @pytest.mark.parametrize("kinds", ["aa", "da", "dd", "ada"])
 def test_kernels_and_series_of_functions_of_several(kinds):
     def make(a, b):
@@ -293,6 +294,7 @@ SAMPLES = {
 }
 
 
+@pytest.mark.slow_for("motion", "polynomial")
 @pytest.mark.parametrize("given", [{"ratio": 0.7}, *CAM.values()], ids=["ratio", *CAM])
 def test_kernels_and_series(given):
     """phi, jacobian, gamma and the coefficients of Taylor series, of every kind of term."""
@@ -335,6 +337,7 @@ def test_redundant_couplers_are_dropped_and_hold():
     assert abs(solution.angle(fast)[-1] - 1.0 / J * 4.5) < 1e-9
 
 
+@pytest.mark.slow
 def test_linearisation_and_equilibrium():
     """Two pendulums of which one turns half as far: (J1 + J2 / 4) q'' = -m g l (1 + 1 / 4) q."""
     scene = ts.Scene(gravity=(0, 0, -9.81))

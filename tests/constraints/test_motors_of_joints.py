@@ -154,6 +154,7 @@ def test_a_file_keeps_what_a_motor_prescribes(tmp_path):
     np.testing.assert_allclose(solution.angle("joint"), 7.0 + 2.0 * solution.t, atol=HELD)
 
 
+@pytest.mark.slow
 def test_a_controller_sees_the_angle_of_the_motor():
     """The motor holds what a torsion bar of 2 N m/rad pulls with at 7 rad."""
     scene, hinge = arm()

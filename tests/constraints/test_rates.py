@@ -325,7 +325,7 @@ class Belt(ts.Primitive):
             out[1] -= s[0, j] * s[0, k - j]
 
 
-@pytest.mark.slow_but("taylor-*", "dop853-constant")
+@pytest.mark.slow_but("dop853-constant")
 @pytest.mark.parametrize("speed", [0.5, 0.5 + 0.3 * np.sin(2.0 * M.time)], ids=["constant", "motion"])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_plug_in_with_both_sorts_of_rows(method, speed):

@@ -306,6 +306,7 @@ def test_a_disc_that_starts_slipping_or_off_the_plane_is_named():
     assert ts.simulate(scene, (0, 1)).success
 
 
+@pytest.mark.slow_for("sliding")
 @pytest.mark.parametrize("slip", [False, True], ids=["rolling", "sliding"])
 def test_a_disc_that_lies_flat_is_named(slip):
     scene = ts.Scene()
@@ -322,6 +323,7 @@ def test_a_disc_that_lies_flat_is_named(slip):
         assert np.isfinite(solution.q).all()
 
 
+@pytest.mark.slow
 def test_a_disc_whose_equilibrium_is_flat_is_named():
     """A ball with its centroid off its centre rolls to where that is lowest; a coin would fall flat."""
     scene, _, _ = rolling("disc")

@@ -57,6 +57,7 @@ def test_trailers_run_on_circles(count):
     assert solution.constraint_error.velocity.max() < 1e-12
 
 
+@pytest.mark.slow
 def test_trailers_cost_in_proportion_to_their_number():
     assert entries(400) < 4.1 * entries(100)
 
@@ -110,6 +111,7 @@ def test_snakeboard():
     assert np.linalg.norm(found[2:, -1]) > 0.5  # it has gone somewhere
 
 
+@pytest.mark.slow
 def test_two_wheels_on_one_axle():
     """Of two rows across the path one is redundant, and one is not: a push from the side moves nothing."""
     scene = two_wheeled_robot.build()
@@ -124,6 +126,7 @@ def test_two_wheels_on_one_axle():
     np.testing.assert_allclose(total, np.tile((0, -5.0, 9.81 * 9.6), (solution.t.size, 1)), atol=1e-11)
 
 
+@pytest.mark.slow
 def test_bicycle():
     """Published eigenvalues to 1e-9, self-stable between the published speeds, and a ride that recovers."""
     bicycle.check(ts.simulate(bicycle.build(), (0.0, 10.0)).raise_if_failed())

@@ -183,7 +183,7 @@ BY_TOLERANCE = {
 }
 
 
-@pytest.mark.slow_for("sdirk54-null-space")
+@pytest.mark.slow_for("sdirk54-null-space", "trapezoid-null-space")
 @pytest.mark.parametrize("form", ["tangent", "null-space"])
 @pytest.mark.parametrize("method", BY_TOLERANCE)
 def test_no_method_leads_past_a_span_that_vanishes(method, form):

@@ -158,6 +158,7 @@ def test_a_mechanism_that_can_not_move():
     assert ts.ensemble(scene, table, SPAN).message == found.message
 
 
+@pytest.mark.slow
 def test_redundant_rows_friction_and_functions():
     for scene in (four_bar.build(), stick_slip.build(), drive_train.build(), everything(np.random.default_rng(1))[0]):
         name = f"{scene.bodies[0].name}.mass"

@@ -67,7 +67,7 @@ STUDIES = {
 }
 
 
-@pytest.mark.slow_for("damped", "loop", "sleigh")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_lanes_agree_with_runs_alone(name, monkeypatch):
     build, end, table = STUDIES[name]
@@ -88,6 +88,7 @@ def test_lanes_agree_with_runs_alone(name, monkeypatch):
     assert errors.position.max() < AGREE
 
 
+@pytest.mark.slow
 def test_lanes_of_rolling_bodies_run_the_loops_of_contacts():
     """Which are twice as quick as those for any marker."""
     contact = STUDIES["coin"][0]().packed.constraints[0]
@@ -109,6 +110,7 @@ def spun():
     return scene, {"body.angular_velocity": spin, "body.velocity": turn}
 
 
+@pytest.mark.slow
 def test_a_case_depends_neither_on_its_neighbours_nor_on_threads():
     scene, table = spun()
     found = ts.ensemble(scene, table, (0, 1), lanes=4, **SHORT)
@@ -124,6 +126,7 @@ def test_a_case_depends_neither_on_its_neighbours_nor_on_threads():
     np.testing.assert_allclose(found.q, one.q, rtol=0, atol=100 * AGREE)
 
 
+@pytest.mark.slow
 def test_outputs_at_times():
     scene, table = spun()
     times = [0.0, 0.1, 0.11, 0.5, 1.0]
@@ -136,6 +139,7 @@ def test_outputs_at_times():
     assert found.q[:, -1].tobytes() == last.q.tobytes()
 
 
+@pytest.mark.slow
 def test_cases_that_fail_spoil_no_other():
     scene = spring()
     table = {"spring.stiffness": 20 * uniform(), "spring.damping": 0.1 * uniform(), "rod 0.mass": uniform()}
@@ -150,6 +154,7 @@ def test_cases_that_fail_spoil_no_other():
         np.testing.assert_array_equal(found.q[i], (one if i in (2, 5) else plain).q[i], err_msg=str(i))
 
 
+@pytest.mark.slow
 def test_motions_that_turn_stiff_are_run_alone():
     scene = ts.Scene(gravity=(0, 0, -10))
     bob = scene.add_point_mass(1.0, position=(1, 0, 0), name="bob")
@@ -208,6 +213,7 @@ def test_what_lanes_cannot_serve_is_refused_by_name(message):
         ts.ensemble(build(), **given)
 
 
+@pytest.mark.slow
 def test_a_store_and_a_file_say_how_many_lanes(tmp_path):
     scene, path = spring(), tmp_path / "study.h5"
     table = {"spring.stiffness": 20 * uniform()}

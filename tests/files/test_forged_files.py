@@ -53,6 +53,7 @@ def fuzz(kind, count, seed, folder):
     return json.loads(found.stdout.splitlines()[0])
 
 
+@pytest.mark.slow_for("scene", "ensemble.h5")
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of memory are POSIX's")
 @pytest.mark.parametrize(
     ("kind", "count"),

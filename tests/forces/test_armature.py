@@ -125,6 +125,7 @@ def test_parameters_files_and_ensembles(tmp_path):
     assert abs(ts.simulate(again, (0, 1), rtol=1e-10, atol=1e-10).state.angle("hinge") - expected(0.04)) < NEAR
 
 
+@pytest.mark.slow
 def test_friction_that_follows_from_reactions_acts_beside_it():
     for integrator, formulation in (("taylor", "tangent"), ("dop853", "tangent"), ("dop853", "null-space")):
         scene = ts.Scene(gravity=(0, 0, -10))

@@ -124,6 +124,7 @@ def test_every_actuator_is_the_force_that_it_is_named_after():
     assert np.abs(controlled - alone).max() < HELD * np.abs(alone).max()
 
 
+@pytest.mark.slow
 def test_user_force_of_the_scene_acts_and_reacts():
     def pull(t, state, par, out):
         d = state.position("b") - state.position("a", (0.1, 0, 0))
@@ -315,7 +316,7 @@ def test_ctrl_c_in_a_kernel_that_calls_a_law_is_answered(task):
     scene = cart(on_rail(law))
     options = {"integrator": ts.integrators.RK45(rtol=1e-6), "dense_output": task == "read"}
     whole = ts.simulate(scene, (0, 2), **options)
-    for _ in range(5):
+    for _ in range(3):
         begun.clear()
         thread = threading.Thread(target=press)
         thread.start()
@@ -533,6 +534,7 @@ def test_a_value_that_is_not_finite_is_named():
         ts.simulate(cart(on_rail(lambda t, state: np.nan)), (0, 1))
 
 
+@pytest.mark.slow
 def test_arrays_stay_for_functions_that_ask_no_method():
     def array(t, state):
         return -state[7], 0.0, 0.0

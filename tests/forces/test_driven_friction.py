@@ -35,6 +35,7 @@ def cubic(t):
     return 0.3 * (t - 1.0) ** 3 + 0.3
 
 
+@pytest.mark.slow_for("*null-space*")
 @pytest.mark.parametrize(
     ("motion", "rate"), [(ts.motions.Sine(0.5, 2.0), 1.0), (cubic, 0.9)], ids=["to and fro", "an inflection"]
 )

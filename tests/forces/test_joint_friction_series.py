@@ -123,6 +123,7 @@ def test_a_plug_in_with_series():
     np.testing.assert_allclose(solution.q[-1], other.q[-1], atol=HELD)
 
 
+@pytest.mark.slow
 def test_a_law_that_is_written_anew_has_no_series():
     class Wet(SmoothBall):
         @staticmethod

@@ -54,6 +54,7 @@ def test_each_block_on_a_belt_has_the_period_of_one_alone(packs):
     assert len(packs) <= 4  # the whole scene's gaps, with open contacts, and with all rows that hold frictions
 
 
+@pytest.mark.slow
 def test_a_chain_of_rough_pins(packs):
     """What sticks doesn't turn, all else does, and friction takes what energy is lost."""
     count = 18

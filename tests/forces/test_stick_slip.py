@@ -72,6 +72,7 @@ METHODS = [
 ]
 
 
+@pytest.mark.slow_for("null-space")
 @pytest.mark.parametrize("given", METHODS, ids=lambda given: str(given.get("integrator", given.get("formulation"))))
 def test_a_block_that_stops_and_is_pushed_below_the_limit_rests(given):
     """1 m/s, pushed to and fro with nine tenths of its friction: the place from the root of its velocity."""
@@ -168,6 +169,7 @@ def test_a_reversal_without_rest():
     np.testing.assert_allclose(solution.position("block")[-1], way * along, atol=FINE)
 
 
+@pytest.mark.slow_for("0.0-0.0")
 @pytest.mark.parametrize(("start", "end"), [(0.0, 0.0), (0.9, 0.0), (1.1, None)])
 def test_a_start_at_rest_sticks_by_the_static_bound(start, end):
     """A torque that static friction holds, or not: a wheel with CoulombFriction of a given torque."""
@@ -360,6 +362,7 @@ def test_wrong_statics_are_refused():
         ts.simulate(scene, (0.0, 0.1)).sticking("drag")
 
 
+@pytest.mark.slow_for("plane")
 @pytest.mark.parametrize("kind", ["plane", "given"])
 def test_a_slide_that_begins_across_its_load_keeps_the_quick_method(kind):
     """A load that turns, hardly above the bound: slip turns the faster the slower it is, which is stiff at first."""

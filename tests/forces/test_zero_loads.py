@@ -64,6 +64,7 @@ def test_a_file_that_says_nothing_of_a_force_is_refused(tmp_path):
         ts.load(path)
 
 
+@pytest.mark.slow
 def test_zeros_beside_others_in_lanes():
     scene = ts.Scene()
     bob = scene.add_body(1.0, (0.1, 0.2, 0.25), position=(1, 0, 0), name="bob")

@@ -111,7 +111,7 @@ ORDERS = {  # method, options, steps, least order observed
 }
 
 
-@pytest.mark.slow_but("nystrom4, null-space", "rk45, placed", "radau", "trapezoid, null-space")
+@pytest.mark.slow_but("nystrom4, null-space", "rk45, placed", "radau")
 @pytest.mark.parametrize("case", ORDERS.values(), ids=ORDERS)
 def test_order(case):
     """Errors fall with the order of the method, on a sleigh with rows of both sorts."""
@@ -172,6 +172,7 @@ def stiff():
     return scene
 
 
+@pytest.mark.slow
 def test_stiff_scenes_take_long_steps_in_the_null_space_form():
     """Steps of a thousand times what an explicit method could take; the motion is that of the tangent form."""
     runs = [
@@ -184,6 +185,7 @@ def test_stiff_scenes_take_long_steps_in_the_null_space_form():
     assert runs[1].constraint_error.velocity.max() < HELD
 
 
+@pytest.mark.slow
 def test_the_default_method_turns_to_an_implicit_one_in_the_null_space_form():
     solution = ts.simulate(stiff(), (0, SPAN), rtol=1e-6, atol=1e-6, formulation="null-space").raise_if_failed()
     assert "The motion is stiff: SDIRK54 took over" in solution.message
@@ -203,7 +205,7 @@ def test_jacobian_of_the_null_space_form(name, rng):
     np.testing.assert_allclose(J, expected, rtol=0, atol=1e-8 * (1.0 + np.abs(expected).max() + np.abs(rates).max()))
 
 
-@pytest.mark.slow_for("sdirk54")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [I.RK45(1e-9, 1e-9), I.SDIRK54(1e-8, 1e-8)], ids=["rk45", "sdirk54"])
 def test_the_null_space_form_crosses_singular_configurations(method):
     """A parallelogram turns over and over beside a ball that rolls down a wall, at g / (1 + J / m R^2)."""

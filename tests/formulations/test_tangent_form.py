@@ -272,6 +272,7 @@ def branch(t, a, b, par, out):
         out[0] = 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [I.DOP853(1e-9, 1e-9), I.Nystrom4(step=1e-2)], ids=repr)
 def test_a_scene_without_series_is_as_well_conditioned_as_it_is(method):
     """The same bits, and so the same work, as with a force of zero that has a series."""

@@ -195,6 +195,7 @@ def test_a_kernel_whose_module_has_moved_is_compiled_without_a_warning(tmp_path)
     assert found == [(2.0, 0, 1, False)] * 2
 
 
+@pytest.mark.slow
 @own
 def test_a_kernel_whose_callee_has_moved_is_compiled_without_a_warning(tmp_path):
     environment = {"TSDYN_CACHE_DIR": str(tmp_path / "kernels")}

@@ -105,7 +105,7 @@ ctypes.CFUNCTYPE = lambda *types: (lambda address: lambda i: 40) if types == (ct
 
 
 @pytest.mark.skipif(compilers.current() is stock, reason="nothing private is used")
-@pytest.mark.slow_but("a pass", "a test that gives another number")
+@pytest.mark.slow_but("a pass")
 @pytest.mark.parametrize("gone", GONE)
 def test_where_something_is_gone_numba_as_it_comes_serves(gone, tmp_path):
     """With one warning; parts that are used by compilation alone need an empty cache."""
@@ -159,6 +159,7 @@ def test_a_damaged_file_of_numba_is_told_and_compiled_again(tmp_path):
         assert run(TINY, environment)[0]["misses"] == 0
 
 
+@pytest.mark.slow
 def test_an_unknown_way_is_told(tmp_path):
     found, errors = run(TINY, {"TSDYN_JIT": "stok"})
     assert found["value"] == 2.0

@@ -49,10 +49,9 @@ def test_a_target_needs_its_instructions(monkeypatch, lacks, found):
 @portable
 def test_a_kernel_of_one_target_is_not_used_for_another(tmp_path):
     environment = {"NUMBA_CACHE_DIR": str(tmp_path)}
-    for name in (target.available()[0], "native"):
-        first, _ = run(TINY, {**environment, "TSDYN_TARGET": name})
-        again, _ = run(TINY, {**environment, "TSDYN_TARGET": name})
-        assert (first["value"], first["misses"], again["value"], again["misses"]) == (2.0, 1, 2.0, 0)
+    for name, misses in ((target.available()[0], 1), ("native", 1), (target.available()[0], 0)):
+        found, _ = run(TINY, {**environment, "TSDYN_TARGET": name})
+        assert (found["value"], found["misses"]) == (2.0, misses)
 
 
 @own
@@ -89,7 +88,7 @@ report(value=call(1000))
 )
 
 
-@pytest.mark.slow_for("ring*")
+@pytest.mark.slow
 @own
 @pytest.mark.parametrize("before", ["", "ring(3), said(3)"])
 def test_users_functions_that_print_or_call_each_other_in_a_ring(tmp_path, before):

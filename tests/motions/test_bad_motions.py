@@ -93,6 +93,7 @@ CALLABLES = {
 }
 
 
+@pytest.mark.usefixtures("few_objects")
 @pytest.mark.slow_but("built-in", "partial")
 @pytest.mark.parametrize("motion", CALLABLES.values(), ids=CALLABLES.keys())
 def test_other_callables_run_or_are_refused(motion):
@@ -120,6 +121,7 @@ def locked():
     return [cache._name for cache in caches if "looked_up" in cache._name and cache._lock is not None]
 
 
+@pytest.mark.usefixtures("few_objects")
 def test_motion_that_numba_cannot_compile():
     with pytest.raises(ts.InvalidConstraint, match=r"lift.*Numba can't compile") as caught:
         lifted((looked_up, zero, zero))(build())
@@ -129,6 +131,7 @@ def test_motion_that_numba_cannot_compile():
     assert held == []
 
 
+@pytest.mark.usefixtures("few_objects")
 def test_motion_object_is_named_after_its_constraint():
     refuse(lambda: lifted(ts.Motion(looked_up_too, zero, zero))(build()), ts.InvalidConstraint, ("lift", "Numba"))
     gc.collect()

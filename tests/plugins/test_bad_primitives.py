@@ -109,6 +109,7 @@ def test_primitives(call, error, words):
     refuse(lambda: call(build()), error, words)
 
 
+@pytest.mark.usefixtures("few_objects")
 def test_primitive_that_numba_cannot_compile():
     call = primitive(phi=staticmethod(phi_of_table))
     refuse(lambda: call(build()), ts.InvalidConstraint, ("Mine", "phi", "Numba"))

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.syntax import nodes, tree, walked
+
 ROOT = Path(__file__).parents[2]
 PLACES = {"tsdyn": ROOT / "tsdyn", "tsdyn.constraints": ROOT / "constraints", "tsdyn.integrators": ROOT / "integrators"}
 # lowest first: a module imports from its own package and those (or modules that lie flat in tsdyn/) before it
@@ -75,17 +77,11 @@ def _district(module):
     return module.split(".")[1] if "." in module else "__init__"
 
 
-@cache
-def tree(module):
-    """The syntax tree of a module."""
-    return ast.parse(FILES[module].read_text())
-
-
 def kernels(*packages):
     """Every decorated function of some packages, with the name of its module."""
     for module in FILES:
         if _district(module) in packages:
-            for node in ast.walk(tree(module)):
+            for node in nodes(FILES[module]):
                 if isinstance(node, ast.FunctionDef) and node.decorator_list:
                     yield module, node
 
@@ -93,11 +89,10 @@ def kernels(*packages):
 def imports(module):
     """The modules of tsdyn that a module imports, lazily or at its top; what type checkers alone import is none."""
     here = module.split(".") if module in PACKAGES else module.split(".")[:-1]
-    blocks = [
-        node for node in tree(module).body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-    ]
-    typed = {node for block in blocks for part in block.body for node in ast.walk(part)}
-    for node in ast.walk(tree(module)):
+    blocks = [node for node in tree(FILES[module]).body if isinstance(node, ast.If)]
+    blocks = [block for block in blocks if ast.unparse(block.test) == "TYPE_CHECKING"]
+    typed = {node for block in blocks for part in block.body for node in walked(part)}
+    for node in nodes(FILES[module]):
         if node in typed or not isinstance(node, ast.ImportFrom) or not node.level:
             continue
         base = [*here[: len(here) - node.level + 1], *(node.module or "").split(".")]
@@ -142,7 +137,7 @@ def test_constraint_rows_have_one_interface():
 def test_redundant_rows_are_dropped_behind_the_interface():
     for module in FILES:
         if _district(module) not in ("rows",):
-            names = {getattr(node, "attr", "") for node in ast.walk(tree(module))}
+            names = {getattr(node, "attr", "") for node in nodes(FILES[module])}
             assert not names & {"dropped", "reselection"}, module
 
 
@@ -162,7 +157,7 @@ def test_arguments_of_kernels_have_one_order():
 def test_kernels_have_no_bare_thresholds():
     """Their numbers are multiples of a half, up to eight; all others have names in tolerances.py."""
     for module, node in kernels(*NAMED_THRESHOLDS):
-        numbers = [one.value for one in ast.walk(node) if isinstance(getattr(one, "value", None), float)]
+        numbers = [one.value for one in walked(node) if isinstance(getattr(one, "value", None), float)]
         bare = [number for number in numbers if number > 8.0 or not (2.0 * number).is_integer()]
         assert not bare, f"{module}.{node.name}: {bare}"
 
@@ -185,7 +180,7 @@ def test_built_in_classes_are_written_with_what_plug_ins_have():
 
 def test_modules_import_each_other_relatively():
     for module in FILES:
-        for node in ast.walk(tree(module)):
+        for node in nodes(FILES[module]):
             if isinstance(node, ast.ImportFrom) and not node.level:
                 assert not node.module.startswith("tsdyn"), module
             if isinstance(node, ast.Import):
@@ -203,7 +198,7 @@ PUBLIC = {  # what may be imported of Numba and llvmlite outside jit/backend.py:
 
 def _compiler_names(module):
     """The names of Numba's and llvmlite's that a module imports, with the modules that they are in."""
-    for node in ast.walk(tree(module)):
+    for node in nodes(FILES[module]):
         if isinstance(node, ast.Import):
             yield from ((alias.name, "") for alias in node.names if alias.name.startswith(("numba", "llvmlite")))
         if isinstance(node, ast.ImportFrom) and not node.level and node.module.startswith(("numba", "llvmlite")):

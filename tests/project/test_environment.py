@@ -4,6 +4,7 @@ import ast
 import re
 
 from tests.helpers.documents import README
+from tests.helpers.syntax import nodes, tree
 
 ROOT = README.parent
 PAGE = (ROOT / "docs" / "environment.md").read_text()
@@ -11,6 +12,10 @@ PAGE = (ROOT / "docs" / "environment.md").read_text()
 
 def is_environ(node):
     return isinstance(node, ast.Attribute) and node.attr == "environ" and getattr(node.value, "id", "") == "os"
+
+
+def is_config(node):
+    return isinstance(node, ast.Attribute) and node.attr == "config" and getattr(node.value, "id", "") == "numba"
 
 
 def names(node):
@@ -21,18 +26,18 @@ def names(node):
 
 def read_in(file):
     """The variables that a file reads: by name, by a tuple of names in the module, or as one of Numba's settings."""
-    tree, found = ast.parse(file.read_text()), set()
-    for node in ast.walk(tree):
+    found = set()
+    for node in nodes(file):
         if isinstance(node, ast.Subscript) and is_environ(node.value):
             found |= names(node.slice)
         if isinstance(node, ast.Compare) and any(map(is_environ, node.comparators)):
             found |= names(node.left)
         if isinstance(node, ast.Call) and is_environ(getattr(node.func, "value", None)) and node.args:
             found |= names(node.args[0])
-        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "numba.config":
+        if isinstance(node, ast.Attribute) and is_config(node.value):
             found.add(f"NUMBA_{node.attr}")
-    if any(map(is_environ, ast.walk(tree))):
-        found |= {name for node in tree.body if isinstance(node, ast.Assign) for name in names(node.value)}
+    if any(map(is_environ, nodes(file))):
+        found |= {name for node in tree(file).body if isinstance(node, ast.Assign) for name in names(node.value)}
     return found
 
 

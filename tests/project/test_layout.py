@@ -5,6 +5,8 @@ import keyword
 import re
 from pathlib import Path
 
+from tests.helpers.syntax import nodes, walked
+
 TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent
 HOUSE_FOLDERS = "tsdyn", "constraints", "integrators"
@@ -15,9 +17,9 @@ LONGEST = 700  # lines
 POSIX = {"fcntl", "grp", "pwd", "resource", "termios"}
 
 
-def imported(file):
+def imported(tree):
     """Modules that a file imports, lazily or at its top."""
-    for node in ast.walk(ast.parse(file.read_text())):
+    for node in walked(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -33,12 +35,12 @@ def test_folders_are_named_after_packages():
 def test_files_are_short_and_share_by_helpers():
     for name, file in FILES.items():
         assert len(file.read_text().splitlines()) <= LONGEST, name
-        names = set(imported(file))
+        tree = ast.parse(file.read_text())
+        names = set(imported(tree))
         tests = {name for name in names if name.split(".")[-1].startswith("test_") and name.startswith("tests")}
         assert not tests, name
         assert not names & POSIX, name
-        body = ast.parse(file.read_text()).body
-        has_tests = any(isinstance(node, ast.FunctionDef) and node.name.startswith("test_") for node in body)
+        has_tests = any(isinstance(node, ast.FunctionDef) and node.name.startswith("test_") for node in tree.body)
         assert file.name.startswith("test_") == has_tests, name
 
 
@@ -46,8 +48,8 @@ def test_texts_of_the_code_name_what_exists():
     """A file that a comment or docstring refers to is another one that is there; so are names in backticks."""
     code = {file: file.read_text() for folder in HOUSE_FOLDERS for file in sorted((ROOT / folder).rglob("*.py"))}
     known = {"tsdyn", *keyword.kwlist, *(part.split(".")[0] for file in code for part in file.relative_to(ROOT).parts)}
-    for text in code.values():
-        for node in ast.walk(ast.parse(text)):
+    for file in code:
+        for node in nodes(file):
             known |= {getattr(node, field, None) for field in ("name", "id", "attr", "arg")}
     for file, text in code.items():
         for named in re.findall(r"(?<![\w.])(?:\w+/)*\w+\.py\b", text):

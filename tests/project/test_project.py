@@ -13,6 +13,7 @@ import tsdyn as ts
 from docs import draw
 from docs.class_pages import URLS
 from tests.helpers.documents import README, pages
+from tests.helpers.syntax import nodes
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *pages()]
@@ -115,14 +116,12 @@ PATH = re.compile(r"(?<![\w/.*-])([\w/-]+\.(?:py|md))\b")
 FOLDERS = ("tsdyn", "constraints", "integrators", "tests", "examples", "benchmarks", "docs")
 
 
-def prose(source):
+def prose(module, source):
     """Docstrings and comments of a module, in one text."""
-    nodes = [
-        node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
-    ]
+    owners = [node for node in nodes(module) if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)]
     tokens = tokenize.generate_tokens(io.StringIO(source).readline)
     comments = [token.string for token in tokens if token.type == tokenize.COMMENT]
-    return "\n".join([*(ast.get_docstring(node) or "" for node in nodes), *comments])
+    return "\n".join([*(ast.get_docstring(node) or "" for node in owners), *comments])
 
 
 def test_files_that_docstrings_and_comments_name_exist():
@@ -134,7 +133,7 @@ def test_files_that_docstrings_and_comments_name_exist():
     for module in modules:
         source = module.read_text(encoding="utf-8")
         if {*PATH.findall(source)} - ends:  # in code too, which may name files of its own
-            assert not {*PATH.findall(prose(source))} - ends, module.relative_to(ROOT)
+            assert not {*PATH.findall(prose(module, source))} - ends, module.relative_to(ROOT)
 
 
 REFERENCE = re.compile(r"(?<![\w./])([a-z]+_[a-z_]{2,})\.(\w{3,})\b(?![/.])")
@@ -146,8 +145,8 @@ def test_names_that_docstrings_and_comments_refer_to_exist():
         path: path.read_text(encoding="utf-8") for folder in FOLDERS[:3] for path in (ROOT / folder).rglob("*.py")
     }
     names = {path.stem: set() for path in modules}
-    for path, source in modules.items():
-        for node in ast.walk(ast.parse(source)):
+    for path in modules:
+        for node in nodes(path):
             names[path.stem] |= {getattr(node, key, None) for key in ("name", "id", "arg", "attr", "asname")}
 
     def is_known(path, owner, name):
@@ -156,6 +155,8 @@ def test_names_that_docstrings_and_comments_refer_to_exist():
     for path, source in modules.items():
         if all(is_known(path, *found) for found in REFERENCE.findall(source)):  # in code, too
             continue
-        said = "\n".join(line for line in prose(source).splitlines() if not line.lstrip().startswith((">>>", "...")))
+        said = "\n".join(
+            line for line in prose(path, source).splitlines() if not line.lstrip().startswith((">>>", "..."))
+        )
         for owner, name in REFERENCE.findall(said):
             assert is_known(path, owner, name), f"{path.relative_to(ROOT)}: {owner}.{name}"

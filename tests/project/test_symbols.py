@@ -4,6 +4,8 @@ import ast
 from collections import defaultdict
 from pathlib import Path
 
+from tests.helpers.syntax import nodes, tree, walked
+
 ROOT = Path(__file__).parents[2] / "tsdyn"
 CORE = (
     "elements/loops", "formulations", "maths", "methods", "model", "motions", "rows", "runs", "taylor",
@@ -23,7 +25,7 @@ def of_function(function):
 
 def names_in(target):
     """The names that an assignment to a target binds."""
-    return {node.id for node in ast.walk(target) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    return {node.id for node in walked(target) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
 
 
 def double_names(function):
@@ -46,7 +48,7 @@ def test_the_walk_finds_a_name_of_two_things():
 def test_a_name_is_bound_to_one_thing_in_a_function():
     found = {}
     for path in FILES:
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree(path).body:
             if isinstance(node, ast.FunctionDef) and (names := double_names(node)):
                 found[f"{path.relative_to(ROOT)}: {node.name}"] = names
     assert found == {}
@@ -55,7 +57,7 @@ def test_a_name_is_bound_to_one_thing_in_a_function():
 def test_a_threshold_of_the_core_has_a_name_of_its_own():
     places = defaultdict(set)
     for path in (ROOT / package / "tolerances.py" for package in (*CORE, "elements")):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body if path.exists() else ():
+        for node in tree(path).body if path.exists() else ():
             if isinstance(node, ast.Assign):
                 for name in names_in(node.targets[0]):
                     places[name].add(path.parent.name)
@@ -68,7 +70,7 @@ def test_a_class_name_has_one_meaning():
     places = defaultdict(set)
     for folder in (ROOT, ROOT.parent / "constraints", ROOT.parent / "integrators"):
         for path in folder.rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for node in nodes(path):
                 if isinstance(node, ast.ClassDef):
                     places[node.name].add(path.relative_to(ROOT.parent).as_posix())
     double = {name: found for name, found in places.items() if len(found) > 1}
@@ -78,7 +80,7 @@ def test_a_class_name_has_one_meaning():
 def test_functions_take_ten_positional_arguments_at_most():
     found = set()
     for path in ROOT.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             if isinstance(node, ast.FunctionDef):
                 names = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args)]
                 if len(names) - (names[:1] in (["self"], ["cls"])) > 10:

@@ -191,6 +191,7 @@ def bar_in_angles(length, times):
     return np.stack([length * np.sin(a) + l * np.cos(b), -length * np.cos(a) + l * np.sin(b)], axis=1)
 
 
+@pytest.mark.slow_for("null-space-*")
 @pytest.mark.parametrize("method", ["rk45", "dop853", pytest.param("sdirk54", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("formulation", ["tangent", "null-space"])
 def test_states_are_on_the_branch_of_the_run(formulation, method, rng):

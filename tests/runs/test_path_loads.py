@@ -85,7 +85,7 @@ def test_the_work_of_bumps_and_notches_anywhere(make, name):
         assert speed(found) == pytest.approx(math.sqrt(1.0 + 2.0 * work), abs=LOOSE)
 
 
-@pytest.mark.slow_but("*dop853", "*rk45")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STAGES)
 def test_a_box_of_a_thousandth_of_the_way(name):
     for at in (0.1, 0.3217, 0.9):
@@ -93,7 +93,7 @@ def test_a_box_of_a_thousandth_of_the_way(name):
         assert speed(found) == pytest.approx(math.sqrt(1.6), abs=LOOSE)
 
 
-@pytest.mark.slow_but("taylor", "dop853", "rk45")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", METHODS)
 def test_a_bump_in_velocity(name):
     """A force of 1 N is 21 N while the speed is within 1e-3 of 1.5 m/s: the time that this takes is less."""
@@ -102,7 +102,7 @@ def test_a_bump_in_velocity(name):
     assert speed(run(mass(bump_of_rate), name)) == pytest.approx(2.0 + saved, abs=FAIR)
 
 
-@pytest.mark.slow_but("dop853")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STAGES)
 def test_a_train_with_gaps_below_a_thousandth_of_the_run(name):
     found = run(mass(train), name)
@@ -113,7 +113,7 @@ def wall(t, state, *, at=0.9, stiffness=1e5):
     return (-state[0] - stiffness * max(0.0, state[0] - at), 0.0, 0.0)
 
 
-@pytest.mark.slow_but("*dop853", "*rk45")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STAGES)
 def test_a_wall_that_an_oscillation_grazes(name):
     """x = sin t meets a wall at cos(w / 2), and leaves it after a half period of the wall's spring, w being 0.02."""
@@ -141,6 +141,7 @@ def user(t, a, b, par, out):
     out[0] = 0.3 / (par[1] * math.sqrt(math.pi)) * np.exp(-(((d - par[0]) / par[1]) ** 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dop853", "taylor"])
 def test_user_forces_between_two_bodies(name):
     """Both masses of 1 kg get half of the work: (1 + 2 u)^2 / 2 = 1 / 2 + 2 work."""
@@ -193,6 +194,7 @@ def high_power(t, state):
     return (-((state[0] / 0.9) ** 40), 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_what_tells_all_at_one_place_is_not_sampled():
     """Sums, sines and products of a few factors; a power of 40 is a wall."""
     for force, count in ((entire, 0), (high_power, 1), (bump, 1), (box, 1)):

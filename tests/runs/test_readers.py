@@ -31,7 +31,7 @@ def test_what_is_read_does_not_depend_on_what_was_read_before(make, options, rng
     fresh = [pickle.loads(pickle.dumps(solution)) for solution in dense]  # with a reader of their own
     made = []
     monkeypatch.setattr(Reader, "__init__", lambda self, *a, init=Reader.__init__: made.append(self) or init(self, *a))
-    times = rng.uniform(0.0, 0.3, 12)
+    times = rng.uniform(0.0, 0.3, 4)
     found = [[solution.at(t) for solution in dense] for t in times]
     assert not made
     for t, states in zip(times, found, strict=True):

@@ -71,7 +71,7 @@ def ball(force, span=SPAN, **options):
     return solution.state.velocity(body)[2]
 
 
-@pytest.mark.slow_but("*box*-dop853", "*box*-default", "*box*-radau")
+@pytest.mark.slow_but("*box*-dop853", "box_up-default", "box_up-radau")
 @pytest.mark.parametrize("name", STAGES)
 @pytest.mark.parametrize("force", [box_up, box_of_state])
 def test_a_box_of_a_thousandth_of_the_run(force, name):
@@ -202,6 +202,7 @@ def test_a_change_that_ends_beside_another_stop_is_none(ulps):
     np.testing.assert_array_equal(stops, [(instant, 1.0, instant), (0.5, 0.0, 0.4)])
 
 
+@pytest.mark.slow
 def test_a_change_in_cases_of_an_ensemble():
     scene = ts.Scene(gravity=(0, 0, 0))
     body = scene.add_point_mass(1.0, name="ball")
@@ -273,6 +274,7 @@ def later(t, state):
     return (lambda: (0.0, 0.0, t))()
 
 
+@pytest.mark.slow
 def test_what_doesnt_read_the_time_is_not_sampled():
     scene = ts.Scene()
     body = scene.add_point_mass(1.0)

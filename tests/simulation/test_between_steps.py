@@ -33,6 +33,7 @@ def chain(*masses):
     return scene
 
 
+@pytest.mark.slow_for("sdirk54-null-space")
 @pytest.mark.parametrize("form", ["tangent", "null-space"])
 @pytest.mark.parametrize("method", ["dop853", "sdirk54"])
 def test_redundant_rows(method, form):

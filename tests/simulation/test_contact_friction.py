@@ -319,6 +319,7 @@ def test_random_impacts_keep_the_laws(seed):
         assert again.qd @ M @ again.qd <= after.qd @ M @ after.qd * (1 + 1e-13)
 
 
+@pytest.mark.slow_for("poisson-0.1", "newton-0.9")
 @pytest.mark.parametrize("mu", [0.1, 0.9])
 @pytest.mark.parametrize("law", ["newton", "poisson"])
 def test_impulses_of_friction_balance_the_momenta(law, mu, tmp_path):
@@ -585,6 +586,7 @@ def test_a_ball_slides_then_rolls_by_an_implicit_method_in_the_null_space_form()
     np.testing.assert_allclose(solution.velocity("ball")[-1], (15 / 7, 0, 0), rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_solution_in_another_process(tmp_path):
     """Multipliers of a phase with friction, and of one with a stop: by memory of that process."""
     scene = boxes(1, velocity=(1, 0, 0))

@@ -83,7 +83,7 @@ MADE = {
 }
 
 
-@pytest.mark.slow_for("of two states")
+@pytest.mark.slow_for("of two states", "of a displacement", "of an angle")
 @pytest.mark.parametrize("made", MADE)
 def test_exceptions_of_functions_are_told(made):
     solution = ts.simulate(MADE[made](), (0, 1))
@@ -112,6 +112,7 @@ def entry(t, state):
     return (values[2 + int(t)], 0.0, 0.0)
 
 
+@pytest.mark.slow_for("entry*")
 @pytest.mark.parametrize(("function", "kind"), [(quotient, ZeroDivisionError), (entry, IndexError)])
 def test_exceptions_at_the_start_are_told(function, kind):
     """A division by zero is an exception, as it is with Python's own numbers."""
@@ -120,6 +121,7 @@ def test_exceptions_at_the_start_are_told(function, kind):
     assert isinstance(caught.value.__cause__, kind)
 
 
+@pytest.mark.slow
 def test_points_and_rates_are_those_of_kernels():
     """The function is called once more with the point, Euler parameters, velocity and angular velocity there."""
 

@@ -467,6 +467,7 @@ def test_the_same_bits_again():
 # Files, prepared runs, ensembles
 
 
+@pytest.mark.slow_for("zarr")
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of the interrupts
 @pytest.mark.parametrize("suffix", ["h5", "zarr"])
 def test_stores_checkpoints_and_saved_solutions(tmp_path, suffix):

@@ -200,6 +200,7 @@ def test_impacts_of_three_balls_that_collapse_end_in_one_velocity(e):
     np.testing.assert_allclose(speeds, [(1 + e) / 2, ((1 + e) / 2) ** 2], rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_impacts_of_shifted_boxes_that_accumulate_are_few(monkeypatch):
     """Each end as without an end of accumulations, after fewer impacts; what falls is lost, and momentum is kept."""
     counts, gap, count = [], 0.003, 3

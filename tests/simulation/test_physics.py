@@ -80,7 +80,7 @@ def sliding(step):
     scene, _ = load("sliding_top")
     (body,) = scene.bodies
     body.velocity = (0.3, -0.2, 0.0)
-    return run(scene, 10.0, step)
+    return run(scene, 3.0, step)
 
 
 def test_energy_error_falls_with_the_fourth_power_of_the_step():

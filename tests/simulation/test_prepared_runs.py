@@ -514,6 +514,7 @@ def test_memories_of_runs_that_take_turns(monkeypatch):
     assert not laid_out
 
 
+@pytest.mark.usefixtures("few_objects")
 def test_what_a_scene_keeps_of_calls():
     """The last few runs, and nothing that was given to them."""
     scene = top.build()

@@ -111,7 +111,7 @@ print("done")
     assert result.stdout.strip() == "done", result.stderr
 
 
-@pytest.mark.slow_but("None-tangent")
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "form"), [(None, "tangent"), ("dop853", "tangent"), ("rk45", "null-space")])
 def test_dense_output_is_pickled(method, form, tmp_path):
     solution = ts.simulate(top.build(), (0.0, 0.3), integrator=method, formulation=form, dense_output=True)

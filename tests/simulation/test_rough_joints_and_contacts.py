@@ -128,6 +128,7 @@ def arm_on_a_slope(slope, mu, hinge, angle, rate, span):
     return solve_ivp(right, (0, span), [0.0, angle, 0.0, rate], "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
 
 
+@pytest.mark.slow_for("*null-space*")
 @pytest.mark.parametrize("given", [{}, {"integrator": "dop853"}, {"formulation": "null-space"}], ids=str)
 def test_a_block_slides_while_its_arm_turns(given):
     """Against minimal coordinates."""

@@ -75,6 +75,7 @@ def test_a_function_of_the_state_is_given_the_scene_s_own_positions():
     np.testing.assert_allclose(solution.qdd[-1], state.qdd, rtol=0.0, atol=ROUGH)
 
 
+@pytest.mark.slow
 def test_where_no_origin_can_be_moved_tolerances_are_what_rounding_allows():
     scene = pendulum(AWAY)
     scene.add(F.PointForce(scene.bodies[0], force=attraction))

@@ -244,7 +244,7 @@ OTHER = {
 }  # fmt: skip
 
 
-@pytest.mark.slow_for("sdirk54")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [None, "taylor", "dop853", "sdirk54"])
 def test_numbers_of_functions_of_the_state(method):
     scene = ruled_by_functions()
@@ -271,13 +271,16 @@ def test_numbers_of_functions_of_the_state(method):
     assert other.copy().parameters()["push.function.loss"] == 1.0
 
 
-def test_an_ensemble_over_numbers_of_functions_of_the_state():
+@pytest.mark.parametrize("method", ["dop853", pytest.param(None, marks=pytest.mark.slow)])
+def test_an_ensemble_over_numbers_of_functions_of_the_state(method):
     scene = ruled_by_functions()
-    found = ts.ensemble(scene, {"turn.function.gain": [50.0, 20.0], "oil.torque.c": [0.3, 1.0]}, (0.0, 0.1))
+    table = {"turn.function.gain": [50.0, 20.0], "oil.torque.c": [0.3, 1.0]}
+    found = ts.ensemble(scene, table, (0.0, 0.1), integrator=method)
     assert found.success.all(), found.message
-    assert found.q[0].tobytes() == ts.simulate(scene, (0.0, 0.1)).state.q.tobytes()
+    assert found.q[0].tobytes() == ts.simulate(scene, (0.0, 0.1), integrator=method).state.q.tobytes()
     values = {"turn.function.gain": 20.0, "oil.torque.c": 1.0}
-    assert found.q[1].tobytes() == ts.simulate(scene.with_parameters(values), (0.0, 0.1)).state.q.tobytes()
+    other = scene.with_parameters(values)
+    assert found.q[1].tobytes() == ts.simulate(other, (0.0, 0.1), integrator=method).state.q.tobytes()
 
 
 def test_a_user_force_has_its_numbers_as_par():
@@ -353,6 +356,7 @@ def test_wrong_values_are_refused_as_when_they_are_set(name):
         scene.with_parameters({name: value})
 
 
+@pytest.mark.slow
 def test_units_and_tables():
     scene = everything(np.random.default_rng(1))[0]
     listed = scene.parameters()

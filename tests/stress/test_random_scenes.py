@@ -13,6 +13,7 @@ from tsdyn.stress.judgement import comparison, judge_case, judge_scene
 from tsdyn.stress.random_scenes import CONTACTS, KINDS, Draw, drawn, generate
 
 
+@pytest.mark.slow
 def test_every_kind_is_drawn():
     assert {generate(seed, 2, 6).name.partition(",")[0] for seed in range(800)} == set(KINDS)
 
@@ -52,7 +53,8 @@ CONTACT_SCENES = (
     *(("ropes", seed) for seed in (107, 110, 118)),  # a rope that comes back, after others have run
     ("ropes", 700089),  # flights of some hundred roundings
     ("cradle", 115), ("balls", 138),  # reactions that are rounding
-    ("chain_over_floor", 9), ("chain_over_floor", 118),  # slips and links that bilateral constraints hold
+    ("chain_over_floor", 9),  # slips and links that bilateral constraints hold
+    pytest.param("chain_over_floor", 118, marks=pytest.mark.slow),
     # Reactions of a stretched chain, which are rounding of accelerations.
     pytest.param("chain_over_floor", 700140, marks=pytest.mark.slow),
     pytest.param("stack", 11, marks=pytest.mark.slow),  # low flights within long steps

@@ -81,13 +81,13 @@ SLOW = ("motion", "tables", "body", "state", "state, body", "state, torque", "to
 CHECKED = {name: make for name, make in LOADS.items() if name != "arrays"}  # truncated series are no vectors' elements
 
 
-@pytest.mark.slow_for(*SLOW)
+@pytest.mark.slow_for(*SLOW, "user")
 @pytest.mark.parametrize("make", CHECKED.values(), ids=CHECKED)
 def test_series_of_loads_are_those_of_their_laws(make):
     ts.testing.check_force(make)
 
 
-@pytest.mark.slow_for(*SLOW)
+@pytest.mark.slow_for(*SLOW, "arrays", "user")
 @pytest.mark.parametrize("make", LOADS.values(), ids=LOADS)
 def test_motions_by_series_are_those_by_stages(make):
     scene, link = arm()

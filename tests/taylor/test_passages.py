@@ -76,6 +76,7 @@ def test_a_run_starts_at_the_anchor():
         assert x == pytest.approx(expected, abs=FAIR)
 
 
+@pytest.mark.slow
 def test_cases_in_lanes_pass_the_anchor():
     scene, k = flight(1e-5), np.linspace(5.0, 60.0, 9)
     found = ts.ensemble(scene, {"spring.stiffness": k}, (0, 1.0), lanes=4).q
@@ -114,6 +115,7 @@ class Cone(ts.Force):
         out[0], out[1] = -4.0 * product(s[0], s[3], k), -4.0 * product(s[1], s[3], k)
 
 
+@pytest.mark.slow
 def test_a_plug_in_that_says_nothing_is_checked():
     """2 m/s inwards from 1 m, then outwards against the force: v^2 = 4 + 8 at the axis, at rest 1.5 m beyond."""
     scene = ts.Scene(gravity=(0, 0, 0))

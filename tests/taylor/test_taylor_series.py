@@ -185,6 +185,7 @@ def test_forces_on_point_masses(end, rng):
     follows_the_same_path(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 3])
 def test_everything_together(seed):
     """All forces and a plug-in on a chain with a loop; two constraints between the same bodies.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.tolerances import CLOSE
-from tsdyn.maths.dense_solve import least_squares, product, solve
+from tsdyn.maths.dense_solve import least_squares, null_space, product, solve
 
 
 @pytest.mark.parametrize(("n", "rank"), [(1, 1), (6, 6), (12, 9), (60, 40)])
@@ -35,3 +35,14 @@ def test_equations_and_products(rng):
     np.testing.assert_allclose(solve(A, B[:, 0]), np.linalg.solve(A, B[:, 0]), rtol=1e-10)
     assert solve(A - np.outer(A[:, 0], np.eye(12)[0]), B[:, 0]) is None
     np.testing.assert_allclose(product(A.T, B), A.T @ B, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("shape", [(7, 4), (4, 7), (5, 5), (0, 3), (3, 0)])
+@pytest.mark.parametrize("rank", [0, 2, 9])
+def test_an_orthonormal_basis_of_a_null_space(shape, rank, rng):
+    m, n = shape
+    A = rng.normal(size=(m, rank)) @ rng.normal(size=(rank, n))
+    Z = null_space(A, 1e-10)
+    assert Z.shape == (n, n - min(m, n, rank))
+    np.testing.assert_allclose(Z.T @ Z, np.eye(Z.shape[1]), atol=CLOSE)
+    np.testing.assert_allclose(A @ Z, 0.0, atol=CLOSE * max(np.abs(A).max(initial=0.0), 1.0))

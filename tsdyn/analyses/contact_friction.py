@@ -10,20 +10,19 @@ joints tie slips to rates of gaps: coefficients of restitution are lowered toget
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
+from ..maths.central_path import deepest
 from ..maths.complementarity import OPEN, STICKS, solve_cone
-from ..maths.dense_solve import least_squares, product, solve
-from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
+from ..maths.dense_solve import least_squares, null_space, product
+from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import AHEAD, EVENT_ERROR, FAR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
 
-# Of `shared`: weights of the margin, most steps at each, the gain that ends them; shares of the largest reaction, of
-# the margin that is deep and of what the end of the path is right to, where some reactions are zero
-PATH, STEPS, SETTLED, MARGIN, PATH_ERROR = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7), 30, 1e-9, 0.1, 1e-8
+# Of the largest reaction: what reactions that are shared are right to, where some are zero
+PATH_ERROR = 1e-8
 
 
 def rows_of(inertia, which):
@@ -471,79 +470,19 @@ def shared(static, loads, p):
 
     loads (3 c, n): accelerations by unit reactions. Where slips depend on each other alone, friction is in proportion
     to its bounds. Where they depend on gaps, contacts brace each other, as those of a ball with floor and wall along
-    the line through both points; on the central path of the cone program
-
-        max t,  N - t >= |T| / mu,  t <= m:      min -w t - log(m - t) - sum log((N - t)^2 - |T|^2 / mu^2) + |p|^2 / 2
-
-    (Boyd and Vandenberghe, 2004, chapter 11) reactions are smooth, and differ from its end by some c / w, which two
-    weights w take away. So they are within their cones as long as any are. The squares bound them where contacts jam.
-    Reactions with the least friction stay as they are where they are deep enough.
+    the line through both points: see `deepest`.
     """
-    size, free = np.abs(p).max(initial=0.0), _null_space(loads.T)
-    if not size > 0.0 or not free.size:
+    sizes, free = np.linalg.norm(loads, axis=1), np.zeros((0, 0))
+    some = sizes > RANK_TOL * sizes.max(initial=0.0)  # others are held
+    if p.any():
+        free = null_space(loads[some].T, RANK_TOL)
+    if not free.size:
         return p
-    if np.abs(free[::3]).max() <= RANK_TOL:
+    ways = np.zeros((p.size, free.shape[1]))
+    ways[some] = free
+    if np.abs(ways[::3]).max() <= RANK_TOL:
         return _in_proportion(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p)
-    k, x = free.shape[1], p.ravel() / size
-    least = x - free @ (free.T @ x)
-    across = free.reshape(-1, 3, k)[:, 1:].reshape(-1, k)
-    least = (least - free @ least_squares(across, least.reshape(-1, 3)[:, 1:].ravel(), RANK_TOL)).reshape(-1, 3)
-    # u = u0 + B y, in units in which all cones are u_0 > |(u_1, u_2)|; y: shares of `free`, then t
-    scale = np.column_stack([np.ones(len(p)), 1.0 / static, 1.0 / static])
-    B = np.concatenate([free, np.tile([-1.0, 0.0, 0.0], len(p))[:, None]], axis=1).reshape(len(p), 3, k + 1)
-    some = np.abs(B[:, :, :k]).max(axis=(1, 2)) > RANK_TOL
-    B, start, metric = scale[some, :, None] * B[some], (scale * least)[some], np.array([1.0, -1.0, -1.0])
-    y, squares = np.zeros(k + 1), np.append(np.ones(k), 0.0)
-    most, margin = MARGIN * np.abs(least).max(), (start[:, 0] - np.hypot(*start[:, 1:].T)).min()
-    if margin >= most:
-        return size * least
-    y[k] = margin - 1.0
-
-    def value(y, weight):
-        u = start + B @ y
-        left, rest = u * u @ metric, most - y[k]
-        if not ((left > 0.0).all() and (u[:, 0] > 0.0).all() and rest > 0.0):
-            return np.inf
-        return 0.5 * squares @ (y * y) - weight * y[k] - np.log(left).sum() - math.log(rest)
-
-    for weight in PATH:
-        before, now = y, value(y, weight)
-        for _ in range(STEPS):
-            u = start + B @ y
-            share, rest = 2.0 / (u * u @ metric), 1.0 / (most - y[k])
-            way = np.einsum("c,ci,cik->ck", share, metric * u, B)
-            slope = squares * y - way.sum(axis=0)
-            slope[k] += rest - weight
-            H = np.diag(squares) + way.T @ way - np.einsum("c,i,cij,cik->jk", share, metric, B, B)
-            H[k, k] += rest * rest
-            step, h = solve(H, -slope), 1.0
-            if step is None:
-                break
-            gain = -slope @ step
-            while (found := value(y + h * step, weight)) > now - 0.1 * h * gain and h > EVENT_ERROR:
-                h *= 0.5
-            y, now = y + h * step, found
-            if gain < SETTLED:
-                break
-    end = y + (y - before) / (PATH[-1] / PATH[-2] - 1.0)
-    part = min(2.0 * (1.0 - margin / most), 1.0)  # of the way: reactions are continuous
-    return size * (least + part * (free @ end[:k]).reshape(-1, 3))
-
-
-def _null_space(A):
-    """An orthonormal basis (n, k) of the x (n,) with A x = 0, but for columns without a size, which others hold.
-
-    P = I - A^+ A = B B^T by Cholesky's factorisation with pivots, which are one at first: so B^T B = I.
-    """
-    sizes = np.sqrt((A * A).sum(axis=0))
-    held = sizes <= RANK_TOL * sizes.max(initial=0.0)
-    P, B = np.eye(len(sizes)) - least_squares(A, A, RANK_TOL), []
-    P[held], P[:, held] = 0.0, 0.0
-    while len(P) and P.diagonal().max() > HALF_DIGITS:
-        i = P.diagonal().argmax()
-        B.append(P[i] / np.sqrt(P[i, i]))
-        P = P - np.outer(B[-1], B[-1])
-    return np.array(B).reshape(-1, len(P)).T
+    return deepest(static, p, ways)
 
 
 def _in_proportion(bounds, slips, p):

@@ -16,6 +16,7 @@ from ..errors import SingularConfiguration
 from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
 from ..formulations.tolerances import EXACT, REFINEMENTS
 from ..jit.kernels import ANY, Record, callback, caller, entry, kernel, loader, long_kernel, matrix, resident, vector
+from ..maths.central_path import follow
 from ..maths.complementarity import CONES
 from ..maths.dense_linalg import copy, largest
 from ..maths.dense_solve import KERNELS as EQUATIONS
@@ -475,7 +476,7 @@ def find_reactions(context, t, levels, memory, redundant, out, loads):
 
 KERNELS = (
     find_gaps, measure_opened, find_open_gaps, find_rows, respond, accelerate, bounce_off, bounce, gain,
-    find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES, *EQUATIONS,
+    find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES, *EQUATIONS, follow,
 )  # fmt: skip
 
 

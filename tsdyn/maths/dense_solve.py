@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..jit.kernels import entry
+from ..jit.kernels import entry, kernel
 from .dense_linalg import lu, lu_solve, multiply, reflect
 
 
@@ -21,14 +21,17 @@ def _product(A, B, out):
     multiply(A, B, out)
 
 
-@entry("mmvvwd")
-def _least_squares(A, X, tau, f, order, limit):
-    """X (max(m, n), k): b on entry, its first n rows x on return. A (m, n) is destroyed; tau, f, order: scratch."""
+@kernel
+def _decompose(A, X, tau, f, order, limit):
+    """The rank of A (m, n) = Q [T 0; 0 0] Z P^T, which is destroyed, and Q^T X in place of X; tau, f, order: scratch.
+
+    A complete orthogonal decomposition (Golub and Van Loan, Matrix Computations, 5.4.2).
+    """
     m, n, k = A.shape[0], A.shape[1], X.shape[1]
     rank, largest = 0, 0.0
     for j in range(n):
         order[j] = j
-    # A P = Q R, the longest of the columns that are left first; Q^T b
+    # A P = Q R, the longest of the columns that are left first; Q^T X
     for c in range(min(m, n)):
         for j in range(c, n):
             f[j] = 0.0
@@ -78,14 +81,13 @@ def _least_squares(A, X, tau, f, order, limit):
             A[i, c] -= s
             for j in range(rank, n):
                 A[i, j] -= s * A[c, j]
-    # P Z^T (T^-1 Q^T b; 0)
-    for i in range(rank - 1, -1, -1):
-        for r in range(i + 1, rank):
-            for j in range(k):
-                X[i, j] -= A[i, r] * X[r, j]
-        for j in range(k):
-            X[i, j] /= A[i, i]
-    X[rank:] = 0.0
+    return rank
+
+
+@kernel
+def _restore(A, X, tau, f, order, rank):
+    """P Z^T X in place of X (n, k), as `_decompose` has left A."""
+    n, k = A.shape[1], X.shape[1]
     for c in range(rank):
         for j in range(k):
             f[j] = X[c, j]
@@ -106,6 +108,32 @@ def _least_squares(A, X, tau, f, order, limit):
             order[c], order[p] = order[p], p
 
 
+@entry("mmvvwd")
+def _least_squares(A, X, tau, f, order, limit):
+    """X (max(m, n), k): b on entry, its first n rows x on return. A (m, n) is destroyed; tau, f, order: scratch."""
+    k, rank = X.shape[1], _decompose(A, X, tau, f, order, limit)
+    for i in range(rank - 1, -1, -1):
+        for r in range(i + 1, rank):
+            for j in range(k):
+                X[i, j] -= A[i, r] * X[r, j]
+        for j in range(k):
+            X[i, j] /= A[i, i]
+    X[rank:] = 0.0
+    _restore(A, X, tau, f, order, rank)
+
+
+@entry("mmvvwd")
+def _null_space(A, X, tau, f, order, limit):
+    """The last columns of X (n, n), whose number is returned: P Z^T (0; I). A (m, n) is destroyed, others: scratch."""
+    n = A.shape[1]
+    rank = _decompose(A, X[:, :0], tau, f, order, limit)
+    for i in range(n):
+        for j in range(n):
+            X[i, j] = 1.0 if i == j else 0.0
+    _restore(A, X[:, rank:], tau, f, order, rank)
+    return n - rank
+
+
 def solve(A, b):
     """x of A x = b, A (n, n), b (n,); None if A is singular or not finite."""
     x = np.array(b, float)
@@ -115,14 +143,20 @@ def solve(A, b):
 def least_squares(A, b, limit):
     """The shortest x (n,) or (n, k) with the least |A x - b|, A (m, n), b (m,) or (m, k).
 
-    By a complete orthogonal decomposition (Golub and Van Loan, Matrix Computations, 5.4.2). Columns whose distance
-    from the span of the others is not above `limit` of the longest depend on these.
+    Columns whose distance from the span of the others is not above `limit` of the longest depend on these.
     """
     (m, n), b = A.shape, np.asarray(b)
     X = np.zeros((max(m, n), *(b.shape[1:] or (1,))))
     X[:m] = b.reshape(m, X.shape[1])
     _least_squares(np.array(A, float, order="C"), X, np.empty(n), np.empty(max(X.shape)), np.empty(n, np.int64), limit)
     return X[:n].reshape(n, *b.shape[1:])
+
+
+def null_space(A, limit):
+    """An orthonormal basis (n, k) of the x (n,) with A x = 0, A (m, n); limit: as of `least_squares`."""
+    n = A.shape[1]
+    X, tau, f, order = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n, np.int64)
+    return X[:, n - _null_space(np.array(A, float, order="C"), X, tau, f, order, limit) :]
 
 
 def product(A, B):
@@ -132,4 +166,4 @@ def product(A, B):
     return out
 
 
-KERNELS = _solve, _least_squares, _product
+KERNELS = _solve, _least_squares, _null_space, _product

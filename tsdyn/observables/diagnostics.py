@@ -67,8 +67,8 @@ def _groups(packed, t, q, qd, qdd, time_rate, memory):
     """Yield rows of Phi (r,) and their three levels, (k, r) each: for constraints of one form at a time."""
     starts, groups = starts_of(packed), {}
     lists = first_rows(packed.constraints), packed.parameters, packed.coordinates, packed.slots
-    for (constraint, row), values, places, slot in zip(*lists, strict=True):
-        held = packed.derived.places.get(id(constraint))
+    for i, ((constraint, row), values, places, slot) in enumerate(zip(*lists, strict=True)):
+        held = packed.derived.places.get(i)
         if held is not None:
             yield (
                 np.arange(row, row + constraint.rows),

@@ -24,7 +24,7 @@ from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
 from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import classes, first_rows, handles_of, index_of
-from ..model.packed import member_of, no_system
+from ..model.packed import has_friction, member_of, no_system
 from ..rows.constraint_graph import REDUCED, graph_of, redundant_rows
 from ..rows.interface import (
     METRIC,
@@ -659,7 +659,7 @@ def touching(packed, member, q):
         find = getattr(type(packed.constraints[i]), "contact", None)
         if find is not None:
             return tuple(level.T for level in twin(find)(_markers(packed, i, q), packed.parameters[i]))
-    if getattr(member.constraint, "has_friction", False):  # a point on a plane
+    if has_friction(packed, member.constraint):  # a point on a plane
         x = _markers(packed, member.parts.start, q)
         return x[:3].T, x[6:9].T
     return None

@@ -293,7 +293,8 @@ class Phases:
 
     def active(self, item, numbers):
         """Whether a part is active in the phases of these numbers (k,)."""
-        return np.array([item.name not in inactive for inactive, _ in self.changes])[numbers]
+        (name,) = handles_of(self.whole).names_of([item])
+        return np.array([name not in inactive for inactive, _ in self.changes])[numbers]
 
     def name_switched(self, parts):
         """Name in each phase which of these parts, that come and go, are active in it."""

@@ -1,0 +1,121 @@
+"""A solution is the record of its run: later changes of the scene neither change it nor break it."""
+
+import copy
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tsdyn.graphics.run_data import run_data
+
+C = ts.constraints
+FLOOR = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": 0.3, "name": "floor"}
+
+
+def flier(**law):
+    """A particle that falls on a floor, bounces, and comes to rest."""
+    scene = ts.Scene()
+    stone = scene.add_point_mass(1.0, position=(0, 0, 0.1), velocity=(0.2, 0.1, 0), name="stone")
+    scene.add(C.PlaneContact(stone, scene.ground, **FLOOR, **law))
+    return scene
+
+
+def roller():
+    """A ball that slides, and then rolls."""
+    scene = ts.Scene()
+    ball = scene.add_body(**ts.shapes.sphere(0.1, mass=1.0), position=(0, 0, 0.1), velocity=(0.2, 0, 0), name="stone")
+    scene.add(C.SphereContact(ball, scene.ground, radius_a=0.1, normal_b=(0, 0, 1), kinetic=0.3, name="floor"))
+    return scene
+
+
+SCENES = {"smooth": flier, "rough": lambda: flier(kinetic=0.3, static=0.4), "roller": roller}
+
+
+def rub(scene):
+    scene["floor"].static, scene["floor"].kinetic = 0.9, 0.5
+
+
+def smooth(scene):
+    scene["floor"].kinetic, scene["floor"].static = 0.0, None
+
+
+def bounce(scene):
+    scene["floor"].restitution = 0.9
+
+
+def hold(scene):
+    smooth(scene)
+    scene["floor"].restitution = 0.0
+    if isinstance(scene["floor"], C.PlaneContact):
+        scene["floor"].unilateral = False
+
+
+def rename(scene):
+    scene["floor"].name, scene["stone"].name = "street", "pebble"
+
+
+def move_on(scene):
+    other = scene.add_point_mass(2.0, position=(5, 0, 1), name="other")
+    scene.add(C.PlaneContact(other, scene.ground, normal_b=(0, 0, 1), unilateral=True, kinetic=0.1, name="more"))
+    scene["stone"].mass, scene.gravity = 7.0, (0, 0, -3)
+    ts.simulate(scene, (0, 0.05))
+
+
+def without(scene):
+    scene.deactivate("floor")
+    scene.remove("floor")
+
+
+FEW = rub, hold, without
+CHANGES = {"smooth": FEW, "rough": (*FEW, smooth, bounce, rename, move_on), "roller": FEW}
+
+
+def record(solution):
+    """What a solution says, as bytes."""
+    force, torque = solution.reaction("floor")
+    late = solution.at(0.45)
+    found = [solution.multipliers, *solution.constraint_error, solution.energy, solution.dissipation, force, torque]
+    found += [late.q, late.multipliers, late.reaction("floor")[0], solution.state.multipliers]
+    found += [solution.to_dataframe(["stone.position.z", "floor.force"]).to_numpy()]
+    if len(solution.multipliers[0]) > 2:
+        found += [solution.sticking("floor"), solution.contact_point("floor"), solution.friction_demand("floor")]
+    return solution.phases, solution.impulses, solution.provenance["scene"], [np.asarray(x).tobytes() for x in found]
+
+
+@pytest.mark.parametrize(("name", "change"), [(name, change) for name in SCENES for change in CHANGES[name]])
+def test_changes_of_the_scene_leave_a_solution_as_it_is(name, change, tmp_path):
+    scene = SCENES[name]()
+    options = {"t_eval": np.linspace(0.0, 0.5, 6), "dense_output": True}
+    expected = record(ts.simulate(SCENES[name](), (0, 0.5), **options))
+    solution = ts.simulate(scene, (0, 0.5), **options)
+    change(scene)
+    assert record(solution) == expected
+    assert record(copy.deepcopy(solution)) == expected
+    solution.save(tmp_path / "run.h5")
+    assert record(ts.load(tmp_path / "run.h5", scene=SCENES[name]())) == expected
+
+
+def test_the_viewer_shows_the_contacts_of_the_run():
+    scene = flier(kinetic=0.3)
+    solution = ts.simulate(scene, (0, 0.5))
+    shown = run_data(solution)
+    smooth(scene)
+    assert run_data(solution) | {"title": ""} == shown | {"title": ""}
+    rename(scene)
+    assert run_data(solution)["contacts"] == shown["contacts"]
+
+
+def test_a_file_has_no_scene_with_other_names(tmp_path):
+    """Phases go by the names of the run."""
+    scene = flier()
+    solution = ts.simulate(scene, (0, 0.5))
+    scene["floor"].name = "street"
+    solution.save(tmp_path / "run.h5")
+    with pytest.raises(ts.StorageError, match="changed since the run"):
+        ts.load(tmp_path / "run.h5")
+
+
+def test_what_is_of_a_class_cant_be_set():
+    scene = roller()
+    with pytest.raises(ts.UnknownAttribute, match="floor: unilateral"):
+        scene["floor"].unilateral = False

@@ -14,7 +14,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, across, not_negative
+from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, across, not_negative, shown
 from .distance import Distance
 from .plane_contact import PlaneContact
 from .rolling_contact import RollingContact
@@ -81,7 +81,7 @@ class SphereContact(Unilateral, Joint):
         **places: Any,
     ) -> None:
         super().__init__(a, b, **places)
-        self.radius_a, self.radius_b, self.normal_b, self.inside = radius_a, radius_b, normal_b, bool(inside)
+        self.radius_a, self.radius_b, self.normal_b, self.inside = radius_a, radius_b, normal_b, inside
         self._set_law(restitution, kinetic, static)
 
     def __setattr__(self, name, value):
@@ -110,6 +110,8 @@ class SphereContact(Unilateral, Joint):
                     f"{self.name}: friction between balls can't turn the point mass {body.name!r}; use add_body, leave "
                     "out kinetic and static, or let it be a with radius_a = 0, a point."
                 )
+        if not isinstance(self.inside, bool):
+            raise InvalidConstraint(f"{self.name}: inside must be True or False, got {shown(self.inside)}.")
         if self.inside and not (self.radius_b is not None and self.radius_a < self.radius_b):
             raise InvalidConstraint(
                 f"{self.name}: inside=True needs radius_b, larger than radius_a = {self.radius_a:g} m."

@@ -574,7 +574,7 @@ def _edited(path, before, after):
 @pytest.mark.parametrize(
     ("action", "said"),
     [
-        (lambda change: change.activate("clutsh"), "did you mean 'clutch'"),
+        (lambda change: change.activate("clutsh"), r"did you mean 'clutch'\? It stopped"),
         (lambda change: change.activate("load"), "load is a body"),
         (lambda change: change.activate("clutch"), r"clutch by 1[01]\."),
         (lambda change: change.set("load.mas", 1.0), "no parameter 'load.mas'"),

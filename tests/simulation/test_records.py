@@ -95,6 +95,22 @@ def test_changes_of_the_scene_leave_a_solution_as_it_is(name, change, tmp_path):
     assert record(ts.load(tmp_path / "run.h5", scene=SCENES[name]())) == expected
 
 
+@pytest.mark.parametrize("law", [{"slip_velocity": 1e-3}, {"force": 0.5}, {"static_force": 6.0}])
+def test_another_law_of_a_friction_leaves_a_solution_as_it_is(law):
+    """A block of 2 kg at 1 m/s that 4 N brake rests after 0.5 s."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    block = scene.add_point_mass(2.0, velocity=(1, 0, 0), name="block")
+    brake = scene.add(ts.forces.CoulombFriction(block, scene.ground, force=4.0, name="brake"))
+    solution = ts.simulate(scene, (0, 1), t_eval=[0.25, 0.75], dense_output=True)
+    for name, value in law.items():
+        setattr(brake, name, value)
+    for found in (solution, copy.deepcopy(solution)):
+        assert found.sticking("brake").tolist() == [False, True]
+        np.testing.assert_allclose(found.dissipation, [2.0, 0.0], rtol=1e-14)
+        np.testing.assert_allclose(found.reaction("brake", on="block")[0][:, 0], [-4.0, 0.0], rtol=1e-14)
+        np.testing.assert_allclose(found.at(0.25).reaction("brake", on="block")[0], [-4.0, 0, 0], rtol=1e-14)
+
+
 def test_the_viewer_shows_the_contacts_of_the_run():
     scene = flier(kinetic=0.3)
     solution = ts.simulate(scene, (0, 0.5))

@@ -212,6 +212,8 @@ class Load(NamedTuple):
     slot: int  # of System.memory, the first; -1 for none
     normal: int  # of System.normals; -1 for none
     programs: tuple  # for each number of par: where in System.reals the program of its series begins; -1 for none
+    remembers: int = 0  # how many numbers are in System.memory
+    slides: tuple = ()  # friction.Sliding of the exact law, each
     law: object = None  # a `laws.Law` of a function that sees the whole scene
 
 
@@ -244,7 +246,8 @@ def pack_forces(forces, where, table, reals, handles):
             rows.append(row)
             slot = slot if len(memory) > slot else -1
             alone = records(ForceKind, [row])
-            loads[id(force)] = Load(force, force.parameters(), force.coordinates, alone, slot, -1, (), law)
+            own = force.parameters(), force.coordinates, alone, slot, -1, (), force.memory + force.taken
+            loads[id(force)] = Load(force, *own, law=law)
             continue
         for force in members:
             begin = len(table), len(reals)
@@ -276,7 +279,8 @@ def pack_forces(forces, where, table, reals, handles):
             alone = records(ForceKind, [[1, stride, 0, force_address, 0, remember, *begin, 0]])
             slot = len(memory) - remembers if remembers else -1
             normal = len(normals) - 1 if "normal_load" in kernels else -1
-            loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal, ())
+            slides = tuple(getattr(force, "slides", ()))
+            loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal, (), remembers, slides)
             expanded[id(force)] = [motion for value in parameters for motion in _series(value)]
         rows.append([len(members), stride, 0, force_address, 0, remember, *first, 0])
     begins = {id(None): -1}

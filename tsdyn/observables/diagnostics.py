@@ -290,7 +290,7 @@ def load_powers(packed, load, t, q, qd, memory):
     if hasattr(kind, "powers"):
         return kind.powers(*_lengths(packed, load.force.points, q, qd), load.parameters)
     par = [entry for value in load.parameters for entry in (value.over(t) if isinstance(value, Signal) else [value])]
-    par += [memory[:, load.slot + i] for i in range(load.force.memory + load.force.taken)]
+    par += [memory[:, load.slot + i] for i in range(load.remembers)]
     if load.normal >= 0:
         par.append(memory[:, packed.system.memory.size + load.normal])
     x, xd = marker_states(packed, load, q, qd)

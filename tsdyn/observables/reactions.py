@@ -310,7 +310,7 @@ def held_reaction(motion, load, body):
     force, torque = np.zeros((2, len(motion.q), 3))
     lam, slot, item = particular(motion.multipliers), load.slot + load.force.memory, load.force
     frames = [rotations(motion.system, motion.packed, each, motion.q) for each in (item.a, item.b)]
-    for slide in item.slides:
+    for slide in load.slides:
         first = slot + slide.directions
         for k, row in enumerate(motion.packed.derived.holds.get(slot, ())):
             numbers = motion._memory[:, first + k * slide.row_numbers :][:, : slide.row_numbers]
@@ -531,7 +531,7 @@ def exerted(motion, item, on):
     if load is not None:
         body = acted(motion.packed, item, on)
         force, torque = force_reaction(motion, load, body)
-        if getattr(item, "slides", ()) and motion.packed.derived.holds:
+        if load.slides and motion.packed.derived.holds:
             more = held_reaction(motion, load, body)
             return force + more[0], torque + more[1]
         return force, torque

@@ -197,8 +197,9 @@ def ask(run, events, last):
         try:
             event.action(change)
         except Exception as error:
-            said = str(error).rstrip(".")
-            run.reason = f"The action of {event.name} raised {type(error).__name__} at t = {run.t:.9g} s: {said}."
+            said = str(error)
+            end = "" if said.endswith((".", "?", "!")) else "."
+            run.reason = f"The action of {event.name} raised {type(error).__name__} at t = {run.t:.9g} s: {said}{end}"
             return None
     change._over = True
     return change
@@ -206,9 +207,9 @@ def ask(run, events, last):
 
 def _deep(run):
     """The contacts whose gaps are below zero, each with its depth."""
-    tol = run.options.initial_tol * (1.0 + np.abs(run.q).max())
+    allowed = -run.options.initial_tol * run.gaps.lengths(run.length)
     values = run.gaps.at(run.q, run.remembered[: run.count])
-    return [f"{run.gaps.names[i]} by {-values[i]:.3g}" for i in run.able if values[i] < -tol]
+    return [f"{run.gaps.names[i]} by {-values[i]:.3g}" for i in run.able if values[i] < allowed[i]]
 
 
 class Jump(NamedTuple):

@@ -111,6 +111,19 @@ def test_another_law_of_a_friction_leaves_a_solution_as_it_is(law):
         np.testing.assert_allclose(found.at(0.25).reaction("brake", on="block")[0], [-4.0, 0, 0], rtol=1e-14)
 
 
+def test_a_copy_knows_its_handles_in_every_phase():
+    """Of a run with another mass in its second half; a bob of 1 kg, then of 3 kg, hangs at rest."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bob = scene.add_point_mass(1.0, position=(0, 0, -1), name="bob")
+    rod = scene.add(C.Distance(bob, scene.ground, name="rod"))
+    event = lambda t, state: t - 0.5  # noqa: E731
+    event.action = lambda change: change.set("bob.mass", 3.0)
+    solution = ts.simulate(scene, (0, 1), t_eval=[0.25, 0.75], events=event)
+    twin, own, there = copy.deepcopy((solution, rod, bob))
+    for found, item, body in ((solution, rod, bob), (twin, own, there)):
+        np.testing.assert_allclose(found.reaction(item, on=body)[0][:, 2], [10.0, 30.0], rtol=1e-12)
+
+
 def test_the_viewer_shows_the_contacts_of_the_run():
     scene = flier(kinetic=0.3)
     solution = ts.simulate(scene, (0, 0.5))

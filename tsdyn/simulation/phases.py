@@ -127,6 +127,15 @@ class Phases:
         self._columns = {}  # of kinds, when it has been asked for
         self.scenes = []  # of each kind, of phases that were restored
 
+    def __setstate__(self, state):
+        """Let handles of the scene stand for those of phases with other parameters again."""
+        vars(self).update(state)
+        own = handles_of(self.whole)
+        for packed in (*self.packed, *(gaps.packed for gaps in self._gaps)):
+            other = handles_of(packed)
+            if other.bodies[0] is not own.bodies[0]:
+                other.add_aliases(zip((*own.bodies, *own.items), (*other.bodies, *other.items), strict=True))
+
     @property
     def varies(self):
         """Whether forces or numbers differ between phases, not rows alone."""

@@ -103,8 +103,6 @@ class PlaneContact(Unilateral, Primitive):
     def check(self):
         """Refuse inadmissible coefficients of impact and friction."""
         self._check_law()
-        rows = 3 if self.has_friction else 1
-        self.__dict__.update(rows=rows, all_rows=rows)
 
     @cached_property
     def _three(self):

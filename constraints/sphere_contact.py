@@ -14,11 +14,11 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, across, not_negative
+from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, across, not_negative, shown
 from .distance import Distance
 from .plane_contact import PlaneContact
 from .rolling_contact import RollingContact
-from .sphere_rolling import SphereRolling
+from .sphere_rolling import SphereRolling, _PointOnSphere
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
@@ -41,7 +41,8 @@ class SphereContact(Unilateral, Joint):
         Coefficient of restitution: 0 for plastic impacts, 1 for elastic ones.
     kinetic, static : float, float or None
         Coefficients of Coulomb friction: while the balls slide on each other, and the bound of rolling, by default the
-        same. The friction turns the balls; a point mass can't turn and has friction on planes only.
+        same. The friction turns the balls. A point mass can't turn: with friction it is a on planes, and on or in balls
+        as a point, radius_a = 0.
 
     Notes
     -----
@@ -80,7 +81,7 @@ class SphereContact(Unilateral, Joint):
         **places: Any,
     ) -> None:
         super().__init__(a, b, **places)
-        self.radius_a, self.radius_b, self.normal_b, self.inside = radius_a, radius_b, normal_b, bool(inside)
+        self.radius_a, self.radius_b, self.normal_b, self.inside = radius_a, radius_b, normal_b, inside
         self._set_law(restitution, kinetic, static)
 
     def __setattr__(self, name, value):
@@ -103,12 +104,14 @@ class SphereContact(Unilateral, Joint):
             not_negative(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
             if self.radius_a == self.radius_b == 0.0:
                 raise InvalidConstraint(f"{self.name}: two points don't collide; give radius_a or radius_b above 0 m.")
-        if self.has_friction and self.radius_b is not None and 3 in (self.a.dimension, self.b.dimension):
-            body = self.a if self.a.dimension == 3 else self.b
-            raise InvalidConstraint(
-                f"{self.name}: friction between balls can't turn the point mass {body.name!r}; use add_body, or leave "
-                "out kinetic and static."
-            )
+        for body in (self.a, self.b) if self.has_friction and self.radius_b is not None else ():
+            if body.dimension == 3 and not (body is self.a and self.radius_a == 0.0):
+                raise InvalidConstraint(
+                    f"{self.name}: friction between balls can't turn the point mass {body.name!r}; use add_body, leave "
+                    "out kinetic and static, or let it be a with radius_a = 0, a point."
+                )
+        if not isinstance(self.inside, bool):
+            raise InvalidConstraint(f"{self.name}: inside must be True or False, got {shown(self.inside)}.")
         if self.inside and not (self.radius_b is not None and self.radius_a < self.radius_b):
             raise InvalidConstraint(
                 f"{self.name}: inside=True needs radius_b, larger than radius_a = {self.radius_a:g} m."
@@ -132,7 +135,8 @@ class SphereContact(Unilateral, Joint):
         if self.radius_b is not None:
             share = (-1.0 if self.inside else 1.0) * self.radius_a / self._distance
             centers = {"center_a": self.center_a, "center_b": self.center_b}
-            yield "contact", SphereRolling(self.a, self.b, **centers, distance=self._distance, share=share)
+            kind = _PointOnSphere if self.a.dimension == 3 else SphereRolling
+            yield "contact", kind(self.a, self.b, **centers, distance=self._distance, share=share)
         elif self._is_point:
             for normal in (self.normal_b, *across(self.normal_b)):
                 point = self.center_b + self.radius_a * self.normal_b

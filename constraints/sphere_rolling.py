@@ -246,3 +246,13 @@ class SphereRolling(Primitive):
         """A random pair of balls; they need not touch."""
         places = {f"center_{body}": rng.normal(size=3) for body in "ab"}
         return cls(a, b, **places, distance=rng.uniform(0.5, 2.0), share=rng.uniform(0.2, 0.8))
+
+
+class _PointOnSphere(SphereRolling):
+    """The same of a point mass, which has no directions: e_j are of b, and don't count, since f = 0."""
+
+    markers = (
+        SphereRolling.markers[0],
+        *(Vector("b", marker.argument) for marker in SphereRolling.markers[1:4]),
+        *SphereRolling.markers[4:],
+    )

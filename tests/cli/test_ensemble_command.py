@@ -51,6 +51,14 @@ def test_a_study_of_a_file(folder, capsys):
     assert again["final"]["stone.z"]["50 %"] == pytest.approx(0.5 * 3 - 1.25)
 
 
+def test_times_of_outputs(folder, capsys):
+    """Those of the file are for single runs; those that are asked for are kept."""
+    (folder / "study.toml").write_text(STUDY.replace("end = 0.5", "end = 0.5\nevery = 0.25"))
+    for words, shape in (((), (5, 3)), (("--every", "0.25"), (5, 3, 3))):
+        assert called(capsys, "ensemble", "study.toml", *words, "--output", f"{len(words)}.h5")[0] == 0
+        assert ts.load(f"{len(words)}.h5").q.shape == shape
+
+
 def test_a_grid_and_a_table(folder, capsys):
     text = STUDY.replace("cases = 5\n", "grid = true\n").replace("[0, 0, 5]]", "[0, 0, 5], 3]")
     text = text.replace('{ uniform = [1, "heavy"] }', "[1, 2]")

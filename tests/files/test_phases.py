@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.calls import same_run
 from tests.helpers.contacts import bouncing, box, pendulum
-from tests.helpers.resuming import Stop, same
+from tests.helpers.resuming import Stop
 from tsdyn.runs import driver
 
 C, G = ts.constraints, 9.81
@@ -55,7 +56,7 @@ def low(t, state):
 
 def alike(one, other):
     """Everything that a solution with phases tells."""
-    same(one, other)
+    same_run(one, other)
     assert (one.phases, one.impulses, one.method) == (other.phases, other.impulses, other.method)
     np.testing.assert_array_equal(one.constraint_error.position, other.constraint_error.position)
     np.testing.assert_array_equal(one.energy, other.energy)

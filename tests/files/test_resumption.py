@@ -10,8 +10,9 @@ import tsdyn as ts
 from benchmarks.stiff import jointed
 from examples import driven_pivot, four_bar, geared_pair, top
 from tests.helpers.built_in import FORCES, by_name
+from tests.helpers.calls import same_run
 from tests.helpers.refusals import refuse
-from tests.helpers.resuming import Stop, same
+from tests.helpers.resuming import Stop
 from tests.helpers.skates import sleigh
 from tsdyn.files import checkpoint
 from tsdyn.runs import driver
@@ -33,8 +34,8 @@ def stop_and_go_on(build, end, path, again=None, **options):
     given = {"scene": again, "events": options.get("events")}
     ts.resume(path, **given, progress=Stop(2))
     resumed = ts.resume(path, **given)
-    same(whole, resumed)
-    same(whole, ts.resume(path, **given))  # a finished run
+    same_run(whole, resumed)
+    same_run(whole, ts.resume(path, **given))  # a finished run
     return stopped
 
 
@@ -122,7 +123,7 @@ def test_forces_without_functions_of_the_user_need_no_scene(kind, tmp_path, rng)
     scene.add(kind.example(rng, *bodies))
     scene.assemble()
     solution = ts.simulate(scene, (0.0, 0.01), store=tmp_path / "run.h5", checkpoint=60.0, history=True)
-    same(solution, ts.resume(tmp_path / "run.h5"))
+    same_run(solution, ts.resume(tmp_path / "run.h5"))
 
 
 @pytest.mark.slow_but("redundant-dop853", "turns-default")
@@ -190,7 +191,7 @@ def test_a_run_that_max_steps_stops_may_make_as_many_steps_again(build, method, 
         assert found[-1].stats.steps == len(found) * most
         found.append(ts.resume(path))
     assert len(found) == -(-whole.stats.steps // most)
-    same(whole, found[-1])
+    same_run(whole, found[-1])
 
 
 def test_scenes_with_code_are_passed_again(tmp_path):
@@ -220,7 +221,7 @@ def test_singular_configurations(method, count, tmp_path):
     path, options = tmp_path / "run.h5", {"integrator": method, "history": True}
     whole = ts.simulate(folding(), (0.0, 6.0), **options)
     ts.simulate(folding(), (0.0, 6.0), store=path, checkpoint=0.0, progress=Stop(count), **options)
-    same(whole, ts.resume(path))
+    same_run(whole, ts.resume(path))
     assert method is None or "singular" in whole.message
 
 
@@ -236,9 +237,9 @@ def test_runs_that_turn_to_an_implicit_method(count, tmp_path, monkeypatch):
     assert "Radau took over 3 times" in whole.message
     stopped = ts.simulate(jointed(), (0.0, 2.0), store=path, checkpoint=0.0, progress=Stop(count), **options)
     assert stopped.status == ts.Status.INTERRUPTED
-    same(whole, ts.resume(path))
+    same_run(whole, ts.resume(path))
     again = ts.resume(path)
-    same(whole, again)
+    same_run(whole, again)
     assert again.method == whole.method
 
 
@@ -278,7 +279,7 @@ def test_friction_that_comes_to_rest(tmp_path, short_slices):
     for count in (3, 8):
         path = tmp_path / f"{count}.zarr"
         ts.simulate(stopping(), (0.0, 3.0), history=True, store=path, checkpoint=0.0, progress=Stop(count))
-        same(ts.simulate(stopping(), (0.0, 3.0), history=True), ts.resume(path))
+        same_run(ts.simulate(stopping(), (0.0, 3.0), history=True), ts.resume(path))
 
 
 def controlled():

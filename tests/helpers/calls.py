@@ -11,7 +11,7 @@ def same_run(one, two):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name), err_msg=name)
     for name in ("method", "span", "formulation", "status", "message", "success", "reached"):
         assert getattr(one, name) == getattr(two, name), name
-    for a, b in zip(one.state, two.state, strict=True):
+    for a, b in zip((*one.state, *(one.t_events or [])), (*two.state, *(two.t_events or [])), strict=True):
         np.testing.assert_array_equal(a, b)
     counts = [{**vars(each.stats), "seconds": None} for each in (one, two)]
     assert counts[0] == counts[1]

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.calls import PARTS
 from tests.helpers.reference import load
 from tests.helpers.scenes import build, random_chain, random_pair
 
 FORMULATIONS = ("tangent", "null-space", "maggi-kane")
-ARRAYS = ("t", "q", "qd", "qdd", "multipliers")
 STEP = 1 / 256  # s; a power of two, so that times of steps are exact
 
 
@@ -17,7 +17,7 @@ def run(scene, span, step=STEP, **options):
     return ts.simulate(scene, span, integrator=integrator, **options).raise_if_failed()
 
 
-def same(one, two, names=ARRAYS):
+def same(one, two, names=PARTS):
     for name in names:
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name), err_msg=name)
 
@@ -44,4 +44,4 @@ def assembled(definition):
 
 
 def rows(solution, which):
-    return type("Rows", (), {name: getattr(solution, name)[which] for name in ARRAYS})
+    return type("Rows", (), {name: getattr(solution, name)[which] for name in PARTS})

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.fixed_steps import ARRAYS, SCENES, STEP, formulations, rows, run, same, same_history, scenes
+from tests.helpers.calls import PARTS
+from tests.helpers.fixed_steps import SCENES, STEP, formulations, rows, run, same, same_history, scenes
 from tests.helpers.reference import Reference, error, load
 from tests.helpers.scenes import build, random_chain, rotation
 from tests.helpers.tolerances import EPS, FINE, HELD
@@ -46,7 +47,7 @@ def test_two_runs_joined_are_as_good_as_one(name):
 def test_state_is_the_last_output():
     scene, _ = load("two_body_pendulum_spatial")
     solution = run(scene, (0.0, 1.0))
-    for name in ARRAYS:
+    for name in PARTS:
         np.testing.assert_array_equal(getattr(solution.state, name), getattr(solution, name)[-1])
     solution.state.q[:] = 0.0  # a copy: the solution is not at its mercy
     assert solution.state.q.any()

@@ -165,3 +165,12 @@ def test_work_of_a_motor_that_turns_without_load_is_integrated_at_once(monkeypat
     work = solution.work
     assert len(asked) < 50
     assert np.ptp(solution.energy - work) < 3e-12 * solution.kinetic_energy.max()
+
+
+def test_contacts_without_friction_have_no_power():
+    """Of a stop with two bounds, too."""
+    scene = stop(0.0)
+    solution = ts.simulate(scene, (0, 0.5), dense_output=True)
+    (name,) = [each.name for each in scene.constraints if isinstance(each, C.Stop)]
+    for values in (solution.power_of(name), solution.work_of(name), solution.dissipation):
+        assert values.tolist() == [0.0] * solution.t.size

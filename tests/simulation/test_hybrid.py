@@ -575,7 +575,7 @@ def _edited(path, before, after):
 @pytest.mark.parametrize(
     ("action", "said"),
     [
-        (lambda change: change.activate("clutsh"), "did you mean 'clutch'"),
+        (lambda change: change.activate("clutsh"), r"did you mean 'clutch'\? It stopped"),
         (lambda change: change.activate("load"), "load is a body"),
         (lambda change: change.activate("clutch"), r"clutch by 1[01]\."),
         (lambda change: change.set("load.mas", 1.0), "no parameter 'load.mas'"),
@@ -594,6 +594,19 @@ def test_actions_that_cant_be_carried_out_end_the_run_with_an_account(action, sa
     assert abs(solution.reached - 1.0) < FINE
     with pytest.raises(ts.StepFailure, match=said):
         solution.raise_if_failed()
+
+
+def test_a_change_is_over_after_its_action():
+    """What would do nothing raises; the state of the event stays readable."""
+    scene, _ = rotors()
+    kept = []
+    ts.simulate(scene, (0, 2), events=at(1.0, kept.append))
+    (change,) = kept
+    requests = [("activate", "clutch"), ("deactivate", "clutch"), ("set", "load.mass", 2.0), ("end",)]
+    for name, *arguments in (*requests, ("impulse", "load", (1, 0, 0))):
+        with pytest.raises(ts.InvalidArgument, match="event at t = 1 s is over"):
+            getattr(change, name)(*arguments)
+    assert abs(change.state.angle_rate("load hinge") + 1.0) < FINE
 
 
 def test_what_isnt_an_action_and_what_cant_come_and_go():

@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import tsdyn as ts
-from tests.helpers.resuming import Stop, same
+from tests.helpers.calls import same_run
+from tests.helpers.resuming import Stop
 from tests.helpers.tolerances import ALGEBRA, CLOSE, HELD, TIGHT
 
 C, F = ts.constraints, ts.forces
@@ -166,7 +167,7 @@ def test_a_run_that_stops_goes_on_to_the_same_bits(tmp_path):
     whole = ts.simulate(scene, (0, 3))
     ts.simulate(scene, (0, 3), store=file, checkpoint=0.0, history=True, progress=Stop(4))
     resumed = ts.resume(file)
-    same(resumed, whole)
+    same_run(resumed, whole)
     assert resumed.phases == whole.phases
 
 

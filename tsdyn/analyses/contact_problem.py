@@ -18,7 +18,6 @@ import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
 from ..elements.bodies import turning
-from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.dense_solve import least_squares, product
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
@@ -30,11 +29,12 @@ from .tolerances import LEVEL
 
 
 class Gap(NamedTuple):
-    """One inequality of the scene."""
+    """One inequality of the scene, as it was when it was packed."""
 
     contact: object
     side: object  # a `unilateral.Side`
     row: int  # of Phi
+    parts: tuple  # of the contact
 
 
 class Gaps:
@@ -47,12 +47,14 @@ class Gaps:
     contacts, free : Packed
         Of its contacts' rows alone, the gaps first in their order, and other rows of contacts with friction; of the
         scene with all contacts open.
+    gaps : list of Gap
+        In the order of the rows.
 
     Attributes
     ----------
     packed : Packed
     list : list of Gap
-        In the order of the rows; count is their number.
+        Count is their number.
     names : list of str
         Of their constraints.
     restitution, kinetic, static : ndarray (count,)
@@ -68,15 +70,14 @@ class Gaps:
         Of ratchets, whose gap is always zero: their rate, a function of q and qd (..., n), by their numbers.
     """
 
-    def __init__(self, packed, contacts, free):
-        self.packed, self.list, self._made_of, self._own = packed, [], (packed, contacts, free), threading.local()
-        first = {id(member.constraint): member.rows.start for member in packed.members}
-        for contact in contacts_of(member.constraint for member in packed.members):
-            self.list += [Gap(contact, side, first[id(contact)] + i) for i, side in enumerate(contact.sides)]
-        self.count, self.names = len(self.list), [gap.contact.name for gap in self.list]
-        self.rows = np.array([gap.row for gap in self.list], int)
+    def __init__(self, packed, contacts, free, gaps):
+        self.packed, self.list, self._own = packed, gaps, threading.local()
+        self._made_of = packed, contacts, free, gaps
+        self.count, self.names = len(gaps), handles_of(packed).names_of([gap.contact for gap in gaps])
+        self.rows = np.array([gap.row for gap in gaps], int)
         self.sign = np.array([gap.side.sign for gap in self.list])
-        self.restitution = np.array([gap.contact.restitution for gap in self.list], float)
+        coefficients = {id(law.contact): law.coefficients for law in packed.laws}
+        self.restitution = np.array([coefficients[id(gap.contact)][0] for gap in gaps], float)
         grips = [gap.side.grip for gap in self.list]
         self.rough = np.array([grip is not None for grip in grips], bool)
         self.kinetic = np.array([grip.kinetic if grip else 0.0 for grip in grips], float)
@@ -89,7 +90,7 @@ class Gaps:
         # Where the directions of slips are in their rows, at the point of one of the bodies; their sign there
         self._ways, self._ways_sign = np.zeros(self.count, int), np.ones(self.count)
         for i in np.flatnonzero(self.rough):
-            self._slips[i], part = slip_rows(self.list[i].contact, own), self.list[i].side.row
+            self._slips[i], part = slip_rows(self.list[i], own), self.list[i].side.row
             body, self._ways_sign[i] = (part.a, 1.0) if part.a.dimension else (part.b, -1.0)
             self._ways[i] = packed.system.bodies[index_of(packed, body), 0]
         handles, bodies = handles_of(packed), packed.system.bodies
@@ -133,7 +134,7 @@ class Gaps:
         try:
             return self._own.workspace
         except AttributeError:
-            self._own.workspace = ContactWorkspace(*self._made_of[1:])
+            self._own.workspace = ContactWorkspace(*self._made_of[1:3])
             return self._own.workspace
 
     def all_rows(self, which=slice(None)):
@@ -214,9 +215,9 @@ class Gaps:
         return self.workspace.gaps(np.array([t]), q[None], self.sign)[0, : self.count]
 
 
-def slip_rows(contact, first):
+def slip_rows(gap, first):
     """The rows (2,) of the slip of a contact with friction; first: the first row of each primitive, by its id."""
-    return [first[id(part)] + i for part in contact.parts for i in range(part.all_rows)][1:3]
+    return [first[id(part)] + i for part in gap.parts for i in range(part.all_rows)][1:3]
 
 
 def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):

@@ -186,6 +186,11 @@ def _ensemble(parsed):
     outputs, plot = run.destinations(parsed, document)
     if run.channels_asked(parsed):
         study["keep"] = run.channels_asked(parsed)
+    if study.get("keep", "final") == "final":
+        if parsed.every is None:
+            options.pop("t_eval", None)  # that of the file is for single runs
+        else:
+            study["keep"] = "t_eval"
     if parsed.assemble:
         study["assemble"] = True
     began = time.perf_counter()

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self
 import numpy as np
 
 from ..calls import Placing, complete_docstring, complete_signature, fitting, fitting_constructor, line_of_user
-from ..errors import InvalidConstraint
+from ..errors import InvalidConstraint, UnknownAttribute
 from ..jit.kernels import NumbaError, kernel, twin
 from ..maths import vectors
 from ..maths.vectors import IDENTITY, unit
@@ -505,6 +505,8 @@ class Attachment:
         if name == "name":
             value = new_name(value, self, (*self.scene.constraints, *self.scene.forces), self.error)
             self.scene._titles = None
+        if name not in self.__dict__:
+            raise UnknownAttribute(f"{self.name}: {name} is of its class, or follows from others, and can't be set.")
         before = self.__dict__[name]
         super().__setattr__(name, value)
         try:

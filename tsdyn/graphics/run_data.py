@@ -13,6 +13,7 @@ from ..elements.bodies import rotation_matrix
 from ..errors import InvalidArgument, StepFailure
 from ..maths.tolerances import TINY
 from ..model.handles import handles_of
+from ..model.packed import has_friction
 from ..observables.diagnostics import constraint_rows
 from ..observables.reactions import touching
 from ..observables.tolerances import JUMP, OTHERWISE, SMALL_RANGE
@@ -148,9 +149,9 @@ NAMED = 4  # closed contacts that are named
 
 def contact_states(frames: AnimationFrames, constraints: list[Attached]) -> list[Any]:
     """The states (k,) of each contact at the frames."""
-    closed = _closed(frames)
+    closed, opening = _closed(frames), {id(law.contact) for law in frames.run.packed.laws}
     return [
-        _of_phases(frames, item, closed) if getattr(item, "unilateral", False) else _of_plane(frames, item)
+        _of_phases(frames, item, closed) if id(item) in opening else _of_plane(frames, item)
         for item in (each.item for each in constraints if each.contact is not None)
     ]
 
@@ -170,10 +171,12 @@ def _closed(frames):
 
 
 def _of_phases(frames, item, closed):
-    run, states = frames.run, np.where([item.name in names for names in closed], PUSHES, OPEN)
-    if item.has_friction:
+    run = frames.run
+    (name,) = run.handles.names_of([item])
+    states = np.where([name in names for names in closed], PUSHES, OPEN)
+    if has_friction(run.packed, item):
         states[run.sticking(item)[np.searchsorted(run.t, frames.times, side="right") - 1]] = STICKS
-    hits = np.array([-np.inf, *(t for t, hit, _ in run.impulses if hit == item.name)])
+    hits = np.array([-np.inf, *(t for t, hit, _ in run.impulses if hit == name)])
     last = hits[np.searchsorted(hits, frames.times, side="right") - 1]
     states[frames.times - last <= FLASH * np.ptp(frames.times)] = HIT
     return states

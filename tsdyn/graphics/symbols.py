@@ -238,11 +238,6 @@ class Attached(NamedTuple):
         return self.points.get(letter, np.zeros(3))
 
 
-def shows_state(item: Any) -> bool:
-    """Whether a constraint has a state along a run: it opens, or it is a plane that ought to push."""
-    return isinstance(item, PlaneContact) or getattr(item, "unilateral", False)
-
-
 def attached(packed: Any) -> tuple[list[Attached], list[Attached]]:
     """Constraints, without the normalisations, and forces of a packed scene."""
     index = {id(body): i for i, body in enumerate(packed.bodies)}
@@ -255,7 +250,8 @@ def attached(packed: Any) -> tuple[list[Attached], list[Attached]]:
 
     constraints = [one(member.constraint, member.coordinates) for member in packed.members]
     constraints = [each for each in constraints if not getattr(each.item, "normalises", False)]
-    has_state = [i for i, each in enumerate(constraints) if shows_state(each.item)]
+    opening = {id(law.contact) for law in packed.laws}  # or a plane that ought to push
+    has_state = [i for i, each in enumerate(constraints) if id(each.item) in opening or type(each.item) is PlaneContact]
     for number, i in enumerate(has_state):
         constraints[i] = constraints[i]._replace(contact=number)
     return constraints, [one(load.force, load.coordinates) for load in packed.loads]

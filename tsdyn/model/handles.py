@@ -164,6 +164,8 @@ class Handles:
     ----------
     bodies, items : tuple
         Items are the constraints and forces that have been added, joints whole.
+    names : list of str
+        Of bodies and items, as they were when these were packed.
     rows : tuple of Row
         Of the items that have joint coordinates.
     count : int
@@ -180,6 +182,7 @@ class Handles:
         constraints = [member.constraint for member in members]
         constraints = [each for each in constraints if not getattr(each, "normalises", False)]
         self.items = (*constraints, *forces)
+        self.names = [each.name for each in (*bodies, *self.items)]
         self._where = {body: tuple(place) for body, place in zip(self.bodies, places, strict=True)}
         self._by_item, self._aliases = None, WeakKeyDictionary()
         rows, joints, frames = [], [], []
@@ -218,7 +221,7 @@ class Handles:
     def body(self, body):
         """A body of the scene, by handle or name."""
         if isinstance(body, str):
-            return named(self.bodies, body, "body", InvalidBody)
+            return self._known(self.bodies, body) or named(self.bodies, body, "body", InvalidBody)
         body = self.own(body)
         if not isinstance(body, PointMass) or body not in self._where:
             raise InvalidBody(f"{body!r} is not a body of this scene{self._elsewhere(body)}.")
@@ -234,8 +237,18 @@ class Handles:
     def item(self, item):
         """A constraint or force of the scene, by name; a handle as it is."""
         if isinstance(item, str):
-            return named(self.items, item, "constraint or force", InvalidConstraint)
+            return self._known(self.items, item) or named(self.items, item, "constraint or force", InvalidConstraint)
         return self.own(item)
+
+    def _known(self, things, name):
+        """The one of bodies or items that had a name; None where none had, or several."""
+        known = self.names[: len(self.bodies)] if things is self.bodies else self.names[len(self.bodies) :]
+        return things[known.index(name)] if known.count(name) == 1 else None
+
+    def names_of(self, things):
+        """The names of bodies or items as they were."""
+        known = dict(zip(map(id, (*self.bodies, *self.items)), self.names, strict=True))
+        return [known[id(thing)] for thing in things]
 
     def own(self, handle):
         """A handle of this scene in place of one of another scene of the family."""

@@ -14,6 +14,7 @@ from ..elements.loops.forces import FORCE_INTS
 from ..elements.loops.friction import STAND
 from ..elements.loops.template import AT, DIMENSION
 from ..elements.markers import POINT
+from ..elements.unilateral import contacts_of
 from ..errors import InvalidConstraint, InvalidForce
 from ..jit.interrupts import CollectionsDeferred
 from ..jit.kernels import Record, records, row_of
@@ -104,7 +105,7 @@ class Derived:
     holonomic: bool = False  # whether plug-ins have been found so: motor_starts.demand_holonomic
     loads: dict = None  # reactions.loads_of
     holds: dict = field(default_factory=dict)  # of a phase, phase_scenes.phase_of: slot of a friction -> rows that hold
-    places: dict = field(default_factory=dict)  # it; and id of such a row -> slots, and where its numbers are
+    places: dict = field(default_factory=dict)  # it; and index of such a row's primitive -> slots, and where they are
     row_parts: list = field(default_factory=list)  # idle: reactions.taken
     reactions: dict = field(default_factory=dict)  # of each thread: contact_rows.reaction_workspace
     with_singular_places: list = None  # indices of primitives: reactions.singular_place
@@ -139,11 +140,14 @@ class Derived:
 
     def __reduce__(self):
         """In another process: what doesn't depend on where things are in memory."""
-        return _of, (self.redundant, self.switched, self.turning, self.handles)
+        return _of, tuple(getattr(self, name) for name in KEPT)
 
 
-def _of(redundant, switched, turning, handles):
-    return Derived(redundant, switched, turning, handles)
+KEPT = "redundant", "switched", "turning", "handles", "holds", "places"
+
+
+def _of(*kept):
+    return Derived(**dict(zip(KEPT, kept, strict=True)))
 
 
 WIDTH = 14  # floats of a short row of Phi_q; those of body b begin in the middle
@@ -210,6 +214,8 @@ class Load(NamedTuple):
     slot: int  # of System.memory, the first; -1 for none
     normal: int  # of System.normals; -1 for none
     programs: tuple  # for each number of par: where in System.reals the program of its series begins; -1 for none
+    remembers: int = 0  # how many numbers are in System.memory
+    slides: tuple = ()  # friction.Sliding of the exact law, each
     law: object = None  # a `laws.Law` of a function that sees the whole scene
 
 
@@ -242,7 +248,8 @@ def pack_forces(forces, where, table, reals, handles):
             rows.append(row)
             slot = slot if len(memory) > slot else -1
             alone = records(ForceKind, [row])
-            loads[id(force)] = Load(force, force.parameters(), force.coordinates, alone, slot, -1, (), law)
+            own = force.parameters(), force.coordinates, alone, slot, -1, (), force.memory + force.taken
+            loads[id(force)] = Load(force, *own, law=law)
             continue
         for force in members:
             begin = len(table), len(reals)
@@ -274,7 +281,8 @@ def pack_forces(forces, where, table, reals, handles):
             alone = records(ForceKind, [[1, stride, 0, force_address, 0, remember, *begin, 0]])
             slot = len(memory) - remembers if remembers else -1
             normal = len(normals) - 1 if "normal_load" in kernels else -1
-            loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal, ())
+            slides = tuple(getattr(force, "slides", ()))
+            loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal, (), remembers, slides)
             expanded[id(force)] = [motion for value in parameters for motion in _series(value)]
         rows.append([len(members), stride, 0, force_address, 0, remember, *first, 0])
     begins = {id(None): -1}
@@ -448,6 +456,14 @@ class Member(NamedTuple):
     rows: slice
 
 
+class ContactLaw(NamedTuple):
+    """What no row has of a constraint that opens, as it was when it was packed."""
+
+    contact: object
+    coefficients: tuple  # restitution, kinetic, static; None for what it hasn't
+    labels: tuple  # of its rows
+
+
 class Packed(NamedTuple):
     """A scene as it was when it was packed; a solution keeps it, whatever happens to the scene later."""
 
@@ -461,6 +477,7 @@ class Packed(NamedTuple):
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, the first of each constraint; -1 for none
     contacts: tuple  # of contacts with friction, each with the first slot of its numbers
+    laws: tuple  # a ContactLaw for each constraint that opens
     inertias: tuple  # primitives whose rows add inertia to a joint coordinate, in the order of their forces
     derived: Derived  # what has been worked out from it
 
@@ -564,10 +581,22 @@ def pack(scene, handles=None, whole=None):
     order = dict(zip(kept, firsts, strict=False))
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
     own = tuple((contact, order[contact]) for contact in contacts)
+    laws = tuple(_law_of(contact) for contact in contacts_of(scene.constraints))
     return Packed(
         system, scene.bodies, primitives, tuple(parameters.values()), coordinates, size, loads, members, slots, own,
-        tuple(added), derived,
+        laws, tuple(added), derived,
     )  # fmt: skip
+
+
+def _law_of(contact):
+    given = (getattr(contact, name, None) for name in ("restitution", "kinetic", "static"))
+    coefficients = tuple(value if value is None else float(value) for value in given)
+    return ContactLaw(contact, coefficients, tuple(contact.row_labels))
+
+
+def has_friction(packed, contact):
+    """Whether a constraint was a contact with friction when it was packed."""
+    return any(contact is own for own, _ in packed.contacts)
 
 
 def _shorten(table, kind):
@@ -676,7 +705,8 @@ def _append_programs(motions, reals):
 def _members(constraints):
     part = row = 0
     for constraint in constraints:
-        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.all_rows)
+        own = constraint.parts
+        parts, rows = slice(part, part + len(own)), slice(row, row + sum(each.all_rows for each in own))
         yield Member(constraint, constraint.coordinates, parts, rows)
         part, row = parts.stop, rows.stop
 

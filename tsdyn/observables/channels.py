@@ -19,6 +19,7 @@ from ..elements.loads import JointLoad
 from ..errors import InvalidArgument, StorageError
 from ..forces import Control, Spring
 from ..model.handles import handles_of
+from ..model.packed import has_friction, member_of
 from ..validation import close, listed, sequence, shown
 from .generalised_forces import law_values
 from .reactions import loads_of, member
@@ -88,8 +89,10 @@ class ChannelNames:
     def __init__(self, packed, lacks):
         self.packed, self.lacks, self.things, handles = packed, lacks, {}, handles_of(packed)
         self.rows, self.known = {id(row.item): row for row in handles.rows}, {}
-        for thing in (*handles.bodies, *handles.items):
-            self.things.setdefault(thing.name, []).append(thing)
+        self.names = {}
+        for thing, name in zip((*handles.bodies, *handles.items), handles.names, strict=True):
+            self.things.setdefault(name, []).append(thing)
+            self.names[id(thing)] = name
 
     def meant(self, name):
         """The channels of a name; raises InvalidArgument unless it is that of one object."""
@@ -117,15 +120,15 @@ class ChannelNames:
         if id(thing) in self.known:
             return self.known[id(thing)]
         quantities, natural = _of_body(thing) if isinstance(thing, PointMass) else self._of_item(thing)
-        found = {}
+        found, title = {}, self.names[id(thing)]
         for key, (unit, parts, ask, pick) in quantities.items():
-            name, quantity = f"{thing.name}.{key}", key.partition(".")[0].replace("_", " ")
+            name, quantity = f"{title}.{key}", key.partition(".")[0].replace("_", " ")
             picks = {part: partial(_component, pick, i) for i, part in enumerate(parts)} or {"": pick}
             found[name] = [Channel(name + part, unit, ask, one, quantity) for part, one in picks.items()]
             found |= {one.name: [one] for one in found[name]} if parts else {}
-        found[thing.name] = [one for key in natural for one in found[f"{thing.name}.{key}"]]
+        found[title] = [one for key in natural for one in found[f"{title}.{key}"]]
         if isinstance(thing, Control):
-            found[f"{thing.name}.actuation"] = found[thing.name]
+            found[f"{title}.actuation"] = found[title]
         self.known[id(thing)] = found
         return found
 
@@ -147,8 +150,9 @@ class ChannelNames:
             loads[f"{name}.axis"] = unit, (), partial(_along, item, own, i, exerted), _whole
             if item.drives or isinstance(item, Force):
                 main = [f"{name}.axis"]
-        rolls = any(hasattr(type(part), "contact") for part in getattr(item, "parts", ()))
-        if rolls or getattr(item, "has_friction", False):
+        own = member_of(self.packed, item)
+        rolls = own is not None and any(hasattr(type(part), "contact") for part in self.packed.constraints[own.parts])
+        if rolls or has_friction(self.packed, item):
             names = {"contact_point": ("m", AXES), "friction_demand": ("1", ())}
             for name, (unit, parts) in names.items():
                 ask = partial(_refused, item, self.lacks) if self.lacks else partial(_asked, name, item)

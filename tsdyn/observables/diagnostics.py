@@ -67,8 +67,8 @@ def _groups(packed, t, q, qd, qdd, time_rate, memory):
     """Yield rows of Phi (r,) and their three levels, (k, r) each: for constraints of one form at a time."""
     starts, groups = starts_of(packed), {}
     lists = first_rows(packed.constraints), packed.parameters, packed.coordinates, packed.slots
-    for (constraint, row), values, places, slot in zip(*lists, strict=True):
-        held = packed.derived.places.get(id(constraint))
+    for i, ((constraint, row), values, places, slot) in enumerate(zip(*lists, strict=True)):
+        held = packed.derived.places.get(i)
         if held is not None:
             yield (
                 np.arange(row, row + constraint.rows),
@@ -290,7 +290,7 @@ def load_powers(packed, load, t, q, qd, memory):
     if hasattr(kind, "powers"):
         return kind.powers(*_lengths(packed, load.force.points, q, qd), load.parameters)
     par = [entry for value in load.parameters for entry in (value.over(t) if isinstance(value, Signal) else [value])]
-    par += [memory[:, load.slot + i] for i in range(load.force.memory + load.force.taken)]
+    par += [memory[:, load.slot + i] for i in range(load.remembers)]
     if load.normal >= 0:
         par.append(memory[:, packed.system.memory.size + load.normal])
     x, xd = marker_states(packed, load, q, qd)

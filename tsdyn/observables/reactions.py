@@ -24,7 +24,7 @@ from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
 from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import classes, first_rows, handles_of, index_of
-from ..model.packed import member_of, no_system
+from ..model.packed import has_friction, member_of, no_system
 from ..rows.constraint_graph import REDUCED, graph_of, redundant_rows
 from ..rows.interface import (
     METRIC,
@@ -310,7 +310,7 @@ def held_reaction(motion, load, body):
     force, torque = np.zeros((2, len(motion.q), 3))
     lam, slot, item = particular(motion.multipliers), load.slot + load.force.memory, load.force
     frames = [rotations(motion.system, motion.packed, each, motion.q) for each in (item.a, item.b)]
-    for slide in item.slides:
+    for slide in load.slides:
         first = slot + slide.directions
         for k, row in enumerate(motion.packed.derived.holds.get(slot, ())):
             numbers = motion._memory[:, first + k * slide.row_numbers :][:, : slide.row_numbers]
@@ -531,7 +531,7 @@ def exerted(motion, item, on):
     if load is not None:
         body = acted(motion.packed, item, on)
         force, torque = force_reaction(motion, load, body)
-        if getattr(item, "slides", ()) and motion.packed.derived.holds:
+        if load.slides and motion.packed.derived.holds:
             more = held_reaction(motion, load, body)
             return force + more[0], torque + more[1]
         return force, torque
@@ -659,7 +659,7 @@ def touching(packed, member, q):
         find = getattr(type(packed.constraints[i]), "contact", None)
         if find is not None:
             return tuple(level.T for level in twin(find)(_markers(packed, i, q), packed.parameters[i]))
-    if getattr(member.constraint, "has_friction", False):  # a point on a plane
+    if has_friction(packed, member.constraint):  # a point on a plane
         x = _markers(packed, member.parts.start, q)
         return x[:3].T, x[6:9].T
     return None

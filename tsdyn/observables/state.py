@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from ..calls import fitting, lacking
-from ..elements.force import Force
 from ..errors import InvalidArgument
 from ..model.kinematics import Anchor, Kinematics
-from .reactions import Exerting, multipliers
+from .reactions import Exerting, loads_of, multipliers
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -130,7 +129,8 @@ class RememberingState(State):
         phase, item = self.phase, self.handles.item(item)
         if phase is None:
             return super()._acting(item)
-        of_phase = isinstance(item, Force) and (phase.inactive or phase.values or getattr(item, "slides", ()))
+        load = loads_of(self.packed).get(id(item))
+        of_phase = load is not None and (phase.inactive or phase.values or load.slides)
         packed = phase.packed if of_phase else phase.whole
         if packed is None:
             raise InvalidArgument(SEVERAL)

@@ -79,7 +79,7 @@ class Reactions(KernelFunctions):
         self.sticks = [i for i in modes.closed if modes.sticks(i)]
         first, rough = first_row_of(packed), bool(modes.grips)
         self.normal = np.array([first[id(gap_row(gaps, modes, i))] for i in self.closed], int)
-        self.slip = np.array([slip_columns(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
+        self.slip = np.array([slip_columns(gaps.list[i], first) for i in self.sticks], int).reshape(-1, 2)
         self.which = np.array([self.closed.index(i) for i in self.sticks], int)
         self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
         self.shares = False  # whether dependent rows share friction, which the kernel doesn't know of

@@ -28,7 +28,7 @@ def items_of(gaps, modes):
         if modes.slides(i):
             items += gap.side.grip[:2]
         elif modes.sticks(i):
-            first, *others = gap.contact.parts
+            first, *others = gap.parts
             items += [first, *(part for part, held in zip(others, modes.grips[i], strict=False) if held)]
         else:
             items.append(gap.side.row)
@@ -50,7 +50,7 @@ def gripped(gaps, before, contacts, q, memory):
     """`grips` of the next phase; writes directions, and places of those that come to rest, into memory (slots,)."""
     grips = {}
     for i, d in contacts.grips.items():
-        way, others = memory[gaps.slots[i] :][:3], gaps.list[i].contact.parts[1:]
+        way, others = memory[gaps.slots[i] :][:3], gaps.list[i].parts[1:]
         if d is not None:
             grips[i] = None
             if not (before.slides(i) and np.dot(way, d) > SAME_WAY * np.linalg.norm(way)):
@@ -82,11 +82,11 @@ def gap_row(gaps, modes, i):
     return gap.side.grip.gap if modes.slides(i) else gap.side.row
 
 
-def slip_columns(contact, first):
+def slip_columns(gap, first):
     """The rows (2,) of the slip of a contact that sticks, -1 of one that depends on others."""
-    if len(contact.parts) == 1:
-        return slip_rows(contact, first)
-    return [first.get(id(part), -1) for part in contact.parts[1:]]
+    if len(gap.parts) == 1:
+        return slip_rows(gap, first)
+    return [first.get(id(part), -1) for part in gap.parts[1:]]
 
 
 def carried(gaps, which, t, q, memory, N, T):

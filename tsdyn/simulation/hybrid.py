@@ -40,7 +40,8 @@ class Push(NamedTuple):
 class Change:
     """What the action of an event may change, at the time of the event: the argument of `event.action`.
 
-    All that the actions of one instant ask for is carried out together, after the last of them.
+    All that the actions of one instant ask for is carried out together, after the last of them; later on, a Change that
+    was kept raises InvalidArgument.
 
     Attributes
     ----------
@@ -73,7 +74,15 @@ class Change:
     def __init__(self, scene: Any, t: float, state: State, inactive: Any, values: dict[str, Any]) -> None:
         self.t, self.state = t, state
         self._scene, self._inactive, self._values = scene, dict.fromkeys(inactive), dict(values)
-        self._activated, self._pushes, self._ends = {}, [], False
+        self._activated, self._pushes, self._ends, self._over = {}, [], False, False
+
+    def _demand_present(self):
+        """Refuse what is asked for when the actions of the instant have been called."""
+        if self._over:
+            raise InvalidArgument(
+                f"the event at t = {self.t:.9g} s is over: ask for changes within its action, and keep what another "
+                "one needs, not the Change."
+            )
 
     def activate(self, item: ItemLike) -> None:
         """Let a constraint or force take part from now on; of one that does already, nothing changes.
@@ -87,6 +96,7 @@ class Change:
         -----
         The run ends with an account where a row of the constraint doesn't hold at the positions of the event.
         """
+        self._demand_present()
         item = switchable(self._scene, item)
         if item.name in self._inactive:
             del self._inactive[item.name]
@@ -94,6 +104,7 @@ class Change:
 
     def deactivate(self, item: ItemLike) -> None:
         """Leave out a constraint or force from now on; arguments and errors as of `activate`."""
+        self._demand_present()
         item = switchable(self._scene, item)
         self._activated.pop(item.name, None)
         self._inactive[item.name] = None
@@ -115,6 +126,7 @@ class Change:
         TsdynError
             If the value is inadmissible.
         """
+        self._demand_present()
         field = family_of(self._scene)[0].field(parameter)
         if isinstance(field.owner, PointMass) and field.attribute in START:
             raise InvalidArgument(
@@ -150,6 +162,7 @@ class Change:
         InvalidArgument
             If impulse or point is none.
         """
+        self._demand_present()
         bodies = self._scene.bodies
         body = named(bodies, body, "body", InvalidBody) if isinstance(body, str) else body
         if not any(body is own for own in bodies):
@@ -162,6 +175,7 @@ class Change:
 
     def end(self) -> None:
         """End the run at the event; nothing else that actions of this instant ask for is carried out."""
+        self._demand_present()
         self._ends = True
 
     def __repr__(self) -> str:
@@ -183,17 +197,19 @@ def ask(run, events, last):
         try:
             event.action(change)
         except Exception as error:
-            said = str(error).rstrip(".")
-            run.reason = f"The action of {event.name} raised {type(error).__name__} at t = {run.t:.9g} s: {said}."
+            said = str(error)
+            end = "" if said.endswith((".", "?", "!")) else "."
+            run.reason = f"The action of {event.name} raised {type(error).__name__} at t = {run.t:.9g} s: {said}{end}"
             return None
+    change._over = True
     return change
 
 
 def _deep(run):
     """The contacts whose gaps are below zero, each with its depth."""
-    tol = run.options.initial_tol * (1.0 + np.abs(run.q).max())
+    allowed = -run.options.initial_tol * run.gaps.lengths(run.length)
     values = run.gaps.at(run.q, run.remembered[: run.count])
-    return [f"{run.gaps.names[i]} by {-values[i]:.3g}" for i in run.able if values[i] < -tol]
+    return [f"{run.gaps.names[i]} by {-values[i]:.3g}" for i in run.able if values[i] < allowed[i]]
 
 
 class Jump(NamedTuple):

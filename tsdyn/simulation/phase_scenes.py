@@ -202,30 +202,36 @@ def gaps_of(scene, without=None, holds=()):
 
 
 def _new_gaps(scene, free):
-    from ..analyses.contact_problem import Gaps
+    from ..analyses.contact_problem import Gap, Gaps
 
-    sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
-    rows = [side.gap for _, side in sides]
-    slips = [part for contact, side in sides if side.grip for part in contact.parts]
+    first = first_row_of(scene.packed)
+    gaps = [
+        Gap(contact, side, first[id(contact)] + i, tuple(contact.parts))
+        for contact in contacts_of(scene._added)
+        for i, side in enumerate(contact.sides)
+    ]
+    rows = [gap.side.gap for gap in gaps]
+    slips = [part for gap in gaps if gap.side.grip for part in gap.parts]
     rows += [part for part in slips if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
-    return Gaps(scene.packed, alone.packed, free.packed)
+    return Gaps(scene.packed, alone.packed, free.packed, gaps)
 
 
 def _holding(packed, holds, held):
     """Packed with the numbers of the rows that hold frictions and contacts among what the run remembers."""
     system, begins, first = packed.system, begins_of(packed), first_row_of(packed)
     memory, places = system.memory.copy(), packed.derived.places
+    index = {id(part): i for i, part in enumerate(packed.constraints)}
     for hold, rows in zip(holds, held, strict=True):
         packed.derived.holds[hold.unit.slot] = np.array([first[id(row)] for row in rows], int)
-        places.update(zip(map(id, rows), hold.places(), strict=True))
+        places.update(zip([index[id(row)] for row in rows], hold.places(), strict=True))
     for contact, slot in packed.contacts:
         for k, part in enumerate(contact.parts[1:], 1):
-            if id(part) in begins:
-                places[id(part)] = [(slot + 3 * k + i, 3 + i) for i in range(3)]  # the point of b
-    for row, numbers in places.items():
+            if id(part) in index:
+                places[index[id(part)]] = [(slot + 3 * k + i, 3 + i) for i in range(3)]  # the point of b
+    for i, numbers in places.items():
         for slot, at in numbers:
-            memory[slot] = begins[row] + at
+            memory[slot] = begins[id(packed.constraints[i])] + at
     return packed._replace(system=system._replace(memory=memory))
 
 

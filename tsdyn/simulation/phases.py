@@ -127,6 +127,15 @@ class Phases:
         self._columns = {}  # of kinds, when it has been asked for
         self.scenes = []  # of each kind, of phases that were restored
 
+    def __setstate__(self, state):
+        """Let handles of the scene stand for those of phases with other parameters again."""
+        vars(self).update(state)
+        own = handles_of(self.whole)
+        for packed in (*self.packed, *(gaps.packed for gaps in self._gaps)):
+            other = handles_of(packed)
+            if other.bodies[0] is not own.bodies[0]:
+                other.add_aliases(zip((*own.bodies, *own.items), (*other.bodies, *other.items), strict=True))
+
     @property
     def varies(self):
         """Whether forces or numbers differ between phases, not rows alone."""
@@ -293,7 +302,8 @@ class Phases:
 
     def active(self, item, numbers):
         """Whether a part is active in the phases of these numbers (k,)."""
-        return np.array([item.name not in inactive for inactive, _ in self.changes])[numbers]
+        (name,) = handles_of(self.whole).names_of([item])
+        return np.array([name not in inactive for inactive, _ in self.changes])[numbers]
 
     def name_switched(self, parts):
         """Name in each phase which of these parts, that come and go, are active in it."""

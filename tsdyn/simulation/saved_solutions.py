@@ -255,7 +255,7 @@ def _held(solution, width):
 
 def _outline(solution, numbers):
     """The arrays of an `Outline`, and its numbers entered, of a scene with parts that only their owner has."""
-    if stored_runs.hash_of(solution.scene.packed) != provenance(solution)["scene"]:
+    if not _is_as_run(solution):
         return {}
     found, arrays = stored_runs.outline_of(solution.scene, solution.packed)
     numbers |= found
@@ -264,9 +264,18 @@ def _outline(solution, numbers):
 
 def _scene_as_run(solution):
     """The scene of a solution, if it is still as it was run."""
-    if stored_runs.hash_of(solution.scene.packed) != provenance(solution)["scene"]:
+    if not _is_as_run(solution):
         raise InvalidArgument("the scene has been changed since the run")
     return solution.scene
+
+
+def _is_as_run(solution):
+    """Whether the scene has the numbers and names that it had."""
+    scene = solution.scene
+    if not scene.bodies:
+        return False
+    same = handles_of(scene.packed).names == solution.handles.names
+    return same and stored_runs.hash_of(scene.packed) == provenance(solution)["scene"]
 
 
 def _plain(value):

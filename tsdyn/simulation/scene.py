@@ -73,7 +73,7 @@ def table(scene: Scene) -> str:
 
 def summary(scene: Scene) -> str:
     """What `repr` says of a scene."""
-    rows = sum(constraint.all_rows for constraint in scene.constraints)
+    rows = sum(part.all_rows for part in scene.primitives)
     n = sum(body.dimension for body in scene.bodies)
     points = sum(body.dimension == PARTICLE for body in scene.bodies)
     parts = [(len(scene.bodies) - points, "rigid body", "rigid bodies"), (points, "point mass", "point masses")]

@@ -11,7 +11,6 @@ import numpy as np
 
 from ..calls import fitting, fitting_methods
 from ..drawing import html_table
-from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.charts import REASONS
 from ..methods.integrator import is_plain
@@ -452,7 +451,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def _losses_at(self, t, q, qd, qdd, memory, numbers=None):
         """The same at times of the run, by number or by time of their phases."""
         if self._phases is None or not self._phases.gaps.rough.any():
-            return np.zeros((t.size, 1))
+            return np.zeros((t.size, 0 if self._phases is None else self._phases.gaps.count))
         numbers = self._phases.at(t) if numbers is None else numbers
         lam = self._multipliers_at(t, q, qd, qdd, memory, numbers)
         return self._phases.losses(numbers, lam, t, q, qd)
@@ -518,12 +517,15 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(force[-1].round(6) + 0.0, torque[-1].round(6) + 0.0)
         [ 0.  0. 20.] [  0. -20.   0.]
         """
-        kind = self.handles.item(item)
-        ask = gathered if self._phases is not None and getattr(kind, "slides", ()) else by_phase
-        return ask(self, lambda part: exerted(part, item, on), not isinstance(kind, Force))
+        load = reactions.loads_of(self.packed).get(id(self.handles.item(item)))
+        ask = gathered if self._phases is not None and load is not None and load.slides else by_phase
+        return ask(self, lambda part: exerted(part, item, on), load is None)
 
     def sticking(self, friction: ItemLike) -> Bools:
         """Whether a friction of the exact law sticks: (k,).
+
+        Of several that hold one coordinate, those whose reaction is at their bound count as sliding, though nothing
+        moves: the others stick.
 
         Parameters
         ----------
@@ -553,13 +555,13 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         if mine and self._phases.gaps.rough[mine].any():
             return self._phases.sticking(self._phase_of_rows, mine[0])
         load = reactions.loads_of(self.packed).get(id(item))
-        if load is None or not getattr(item, "slides", ()):
+        if load is None or not load.slides:
             raise InvalidForce(
                 f"sticking: {friction!r} is no friction of the exact law: RevoluteFriction, TranslationalFriction, "
                 "ContactFriction and CoulombFriction are, with slip_velocity=0, and unilateral contacts with kinetic."
             )
         slot, rests = load.slot + item.memory, np.ones(self.t.size, bool)
-        for slide in item.slides:
+        for slide in load.slides:
             rests &= ~self._memory[:, slot : slot + slide.directions].any(axis=1)
             slot += slide.count
         return rests & self._phases.active(item, self._phase_of_rows)

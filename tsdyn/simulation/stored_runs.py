@@ -17,7 +17,6 @@ import numpy as np
 
 from .._version import __version__
 from ..calls import lacking
-from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument, Status, StorageError
 from ..jit.code_hash import is_ours, platform_hash
 from ..jit.compilers import machine
@@ -473,7 +472,8 @@ def _facts(given, kept):
 
 def hash_of(packed):
     """SHA-256 of the packed numbers, to the bit; without addresses."""
-    digest = hashlib.sha256(repr([(body.name, body.dimension) for body in packed.bodies]).encode())
+    bodies = zip(handles_of(packed).names, (body.dimension for body in packed.bodies), strict=False)
+    digest = hashlib.sha256(repr([*bodies]).encode())
     reals = packed.system.reals.copy()
     reals[[load.law.address for load in packed.loads if load.law is not None and load.law.address >= 0]] = 0.0
     for name, array in packed.system._replace(reals=reals)._asdict().items():
@@ -482,9 +482,8 @@ def hash_of(packed):
             digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(repr([type(item).__qualname__ for item in packed.constraints]).encode())
     digest.update(repr([type(load.force).__qualname__ for load in packed.loads]).encode())
-    for contact in contacts_of(member.constraint for member in packed.members):  # no row has these numbers
-        laws = (getattr(contact, name, None) for name in ("restitution", "kinetic", "static"))
-        digest.update(repr([law if law is None else float(law) for law in laws]).encode())
+    for law in packed.laws:  # no row has these numbers
+        digest.update(repr([*law.coefficients]).encode())
     return digest.hexdigest()
 
 
@@ -517,12 +516,13 @@ def width_of(packed):
 
 def row_labels(packed):
     """Title and label of each row of Phi."""
-    seen = {}
+    seen, of_contacts = {}, {id(law.contact): law.labels for law in packed.laws}
     for member in packed.members:
         title = member.constraint.title
         seen[title] = seen.get(title, 0) + 1
         again = "" if seen[title] == 1 else f" #{seen[title]}"
-        yield from ((title + again, label) for label in member.constraint.row_labels)
+        labels = of_contacts.get(id(member.constraint)) or member.constraint.row_labels
+        yield from ((title + again, label) for label in labels)
 
 
 def outline_of(scene, packed):

@@ -103,6 +103,41 @@ def test_python_has_nothing_to_do_between_impacts(monkeypatch):
     np.testing.assert_allclose([p for *_, p in solution.impulses], 2.0 * G * fall, rtol=1e-12)
 
 
+def in_a_box(falls):
+    """A point mass between six walls, 2 m apart, and the times of its impacts within 1,000 s if it doesn't fall."""
+    scene, start, velocity = ts.Scene(gravity=(0, 0, -G * falls)), np.array([0.1, 0.2, 0.3]), np.array([3.0, 2.1, 1.3])
+    body = scene.add_point_mass(1.0, position=start, velocity=velocity)
+    for normal in np.concatenate((np.eye(3), -np.eye(3))):
+        given = {"point_b": -normal, "normal_b": normal, "restitution": 1.0, "unilateral": True}
+        scene.add(ts.constraints.PlaneContact(body, scene.ground, **given))
+    return scene, np.sort(
+        np.concatenate([np.arange(1 - x, 1000.0 * v, 2) / v for x, v in zip(start, velocity, strict=True)])
+    )
+
+
+def test_steps_that_end_far_beyond_impacts(monkeypatch):
+    """A point mass without loss, whose steps have the length of the run: Python sees one impact in a thousand."""
+    asked, transit = [], _ContactRun._transit
+    monkeypatch.setattr(_ContactRun, "_transit", lambda run, fired: asked.append(run.t) or transit(run, fired))
+    scene, times = in_a_box(falls=False)
+    solution = ts.simulate(scene, (0.0, 1000.0))
+    np.testing.assert_allclose([t for t, *_ in solution.impulses], times, rtol=1e-13)
+    scene, _ = in_a_box(falls=True)
+    solution = ts.simulate(scene, (0.0, 1000.0))
+    assert np.ptp(solution.energy) < 1e-12 * solution.energy[0]
+    assert len(asked) < 0.001 * (len(times) + len(solution.impulses))
+
+
+def test_slices_of_a_run_grow_with_an_impact_a_step(monkeypatch):
+    """As many outputs before impacts as after them: 1,000 impacts take some hundred calls at most, not hundreds."""
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
+    calls, advance = [], Flights.advance
+    monkeypatch.setattr(Flights, "advance", lambda *given: calls.append(given[2]) or advance(*given))
+    solution = ts.simulate(ball(), (0.0, 900.0))
+    assert len(solution.impulses) > 990
+    assert len(calls) < 100
+
+
 def test_an_angle_that_stops_bound_beyond_a_turn(monkeypatch):
     """A rod that turns to and fro between -7 and 8 rad, by 0.9 of its rate after each impact; Python sees no gap."""
     monkeypatch.setattr(_ContactRun, "_transit", lambda run, fired: pytest.fail(f"asked at {run.t}"))

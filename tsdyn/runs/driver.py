@@ -173,7 +173,9 @@ class Slices:
         # Aim at SLICE_SECONDS
         if seconds > 2 * SLICE_SECONDS:
             self.most = max(int(rows * SLICE_SECONDS / seconds), 1)
-        elif seconds < SLICE_SECONDS / 2 and self.run.numbers.history >= rows:
+        elif (
+            seconds < SLICE_SECONDS / 2 and 2 * self.run.numbers.history >= rows
+        ):  # a run that begins again takes a row
             self.most = min(2 * self.most, self.recorder.most)
 
     def _look_up(self):

@@ -12,7 +12,9 @@ from ..model.laws import interrupts_answered
 from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
 from .tolerances import (
     DISTANT,
+    EARLY,
     FROM_REST,
+    MOST_PARTS,
     ROOT,
     ROOT_STEPS,
     ROUGH_ROOT,
@@ -98,7 +100,7 @@ class SearchParts(NamedTuple):
     odd: np.ndarray  # int64 (m,)  1 where a `Track` knows more than the value
     last: np.ndarray  # (m,)  values at the end of the step that has been searched
     all: np.ndarray  # values
-    samples: np.ndarray  # ((LARGEST + 4) m,)
+    samples: np.ndarray  # ((LARGEST + 5) m,)
     left: np.ndarray  # int64 (m,)  1 of those that the survey is of
     fine: np.ndarray  # (2, points of the largest grid)
     marks: np.ndarray  # (m, 4)  of a survey
@@ -210,10 +212,11 @@ def _turn_rate(spins, qd):
 
 
 @kernel
-def _survey(s, step, t0, t1, turning, roughly):
+def _survey(s, step, t0, t1, first, turning, roughly):  # seven: the samples
     """The degree that resolves the functions on [t0, t1], with the samples of it, and marks; 0 if there is no state.
 
-    turning: of a body, rad/s. roughly: by states of `_follow`, and no more than the lowest degree.
+    first (m,): values at t0; turning: of a body, rad/s. roughly: by states of `_follow`, and no more than the lowest
+    degree.
     """
     m, known, N = s.value.size, 0, LOWEST
     while not roughly and turning * (t1 - t0) > SHOWN_TURN * N and N < LARGEST:
@@ -237,7 +240,7 @@ def _survey(s, step, t0, t1, turning, roughly):
                 _evaluate(s, step.first, step.second, t, s.state, step.t0, step.before, samples[i])
             elif not _evaluate_within(s, step, t, 0, samples[i]):
                 return 0
-        copy(s.value, samples[0])
+        copy(first, samples[0])
         size = table.fine.size
         fine = matrix(data_of(s.fine), 2, size)
         grid = table.values, table.errors, table.widened, table.fine
@@ -347,34 +350,61 @@ def _find_beside(s, step, t, degree, width, first, value):
     return True
 
 
+@kernel
+def _shown_until(s, t0, end, last):
+    """Up to when to look, at most to the last time, that it shows a zero that isn't on [t0, end]; or the end.
+
+    A step may end far beyond a zero, as those of free flights do: early on there are no points of the grid. Nor are
+    there any beyond one that is close to the end.
+    """
+    since, width = end, end - t0
+    for j in range(s.value.size):
+        since = min(since, s.marks[j, 0])
+    part = max(EARLY * width, 4.0 * (since - t0))
+    if part <= 0.5 * width:
+        return t0 + part
+    return min(end + width, last) if since - t0 > 0.5 * width else end
+
+
 @callback("pppppp")
 def find_first(search, context, run, first, second, arrays):
     """As `search_step`, for kernels; arrays: `StepArrays`."""
     s, a = load_search(search), load_arrays(arrays)
     t0, t1 = s.numbers.t0, s.numbers.t1
     step = SearchedStep(context, run, a.block, a.charts, a.points, first, second, t0, a.before, t1, a.now)
-    numbers, m, end, width, roughly = s.numbers, s.value.size, t1, t1 - t0, _is_smooth(step)
+    numbers, m, end, width, roughly, parts = s.numbers, s.value.size, t1, t1 - t0, _is_smooth(step), 0
     turning = max(_turn_rate(s.spins, a.before[1]), _turn_rate(s.spins, a.now[1]))
-    scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
+    scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 3, m)
+    copy(s.value, scratch[2])
     numbers.place, numbers.found = OTHER_CHART, -1
     for j in range(m):
         s.left[j] = 1
     while True:
-        degree = _survey(s, step, t0, end, turning, roughly)
+        degree = _survey(s, step, t0, end, scratch[2], turning, roughly)
         samples = matrix(data_of(s.samples), degree + 2, m)
         if degree == 0 or (numbers.new != 0 and numbers.found < 0 and _may_have_fallen(s, samples)):
             return UNSURE
         clear = _mark(s, samples)
-        if clear == CLEAR and not (roughly and not _are_far(s, samples)):
-            break
+        if clear == CLEAR and not (roughly and (end < t1 or not _are_far(s, samples))):
+            if numbers.found >= 0 or end == t1:
+                break
+            # Nothing up to there
+            copy(samples[degree + 1], scratch[2])
+            t0, end = end, min(end + (end - t0) / EARLY, t1)
+            continue
+        until = _shown_until(s, t0, end, t1) if clear == FOUND and numbers.found < 0 else end
         if roughly:  # that is to be known better
-            roughly = False
+            roughly, end = until < end, until
             continue
         if clear == UNSURE:
             return UNSURE
         width = end - t0
         if _first_root(s, step, scratch[0], width) != ARRIVED:
-            return UNSURE
+            parts += 1
+            if until == end or parts > MOST_PARTS:
+                return UNSURE
+            end = until
+            continue
         # What was unclear may be clear up to there
         numbers.found, end, unclear = int(s.step[0]), s.step[1], False
         for j in range(m):
@@ -485,7 +515,7 @@ class GroupSearch:
         self.numbers = SearchNumbers(values=called.address, finder=find_first.address)
         self.parts = SearchParts(
             self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(m),
-            np.zeros(count), np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)),
+            np.zeros(count), np.zeros((LARGEST + 5) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)),
             np.zeros((m, 4)), np.zeros(3), np.zeros((3, n)), np.zeros(m, int), np.zeros(angles), memory,
         )  # fmt: skip
         self.address, self._keep = resident(self.parts)

@@ -41,7 +41,7 @@ class SphereContact(Unilateral, Joint):
         Coefficient of restitution: 0 for plastic impacts, 1 for elastic ones.
     kinetic, static : float, float or None
         Coefficients of Coulomb friction: while the balls slide on each other, and the bound of rolling, by default the
-        same. The friction turns the balls; a point mass can't turn and has friction on planes only.
+        same. The friction turns the balls; a point mass can't turn: on a ball of b, or in it, it is a of radius 0.
 
     Notes
     -----
@@ -103,11 +103,11 @@ class SphereContact(Unilateral, Joint):
             not_negative(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
             if self.radius_a == self.radius_b == 0.0:
                 raise InvalidConstraint(f"{self.name}: two points don't collide; give radius_a or radius_b above 0 m.")
-        if self.has_friction and self.radius_b is not None and 3 in (self.a.dimension, self.b.dimension):
-            body = self.a if self.a.dimension == 3 else self.b
+        body = self.a if self.a.dimension == 3 and self.radius_a else self.b
+        if self.has_friction and self.radius_b is not None and body.dimension == 3:
             raise InvalidConstraint(
-                f"{self.name}: friction between balls can't turn the point mass {body.name!r}; use add_body, or leave "
-                "out kinetic and static."
+                f"{self.name}: friction can't turn the point mass {body.name!r}; use add_body, leave out kinetic and "
+                "static, or make it a with radius_a = 0."
             )
         if self.inside and not (self.radius_b is not None and self.radius_a < self.radius_b):
             raise InvalidConstraint(

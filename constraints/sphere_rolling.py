@@ -43,8 +43,8 @@ class SphereRolling(Primitive):
     distance : float, m
         Of the centres.
     share : float
-        Of the line from the centre of a to that of b at which they touch: 1/2 for equal balls, negative within b, 0 where
-        a is a point.
+        Of the line from the centre of a to that of b at which they touch: 1/2 for equal balls, negative within b, 0
+        where a is a point.
     first_a, second_a, third_a, first_b, second_b, third_b : array_like (3,)
         Directions at right angles.
 

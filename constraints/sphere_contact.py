@@ -18,7 +18,7 @@ from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector,
 from .distance import Distance
 from .plane_contact import PlaneContact
 from .rolling_contact import RollingContact
-from .sphere_rolling import SphereRolling, _PointOnSphere
+from .sphere_rolling import SphereRolling
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
@@ -41,8 +41,7 @@ class SphereContact(Unilateral, Joint):
         Coefficient of restitution: 0 for plastic impacts, 1 for elastic ones.
     kinetic, static : float, float or None
         Coefficients of Coulomb friction: while the balls slide on each other, and the bound of rolling, by default the
-        same. The friction turns the balls. A point mass can't turn: with friction it is a on planes, and on or in balls
-        as a point, radius_a = 0.
+        same. The friction turns the balls; a point mass can't turn: on a ball of b, or in it, it is a of radius 0.
 
     Notes
     -----
@@ -104,12 +103,12 @@ class SphereContact(Unilateral, Joint):
             not_negative(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
             if self.radius_a == self.radius_b == 0.0:
                 raise InvalidConstraint(f"{self.name}: two points don't collide; give radius_a or radius_b above 0 m.")
-        for body in (self.a, self.b) if self.has_friction and self.radius_b is not None else ():
-            if body.dimension == 3 and not (body is self.a and self.radius_a == 0.0):
-                raise InvalidConstraint(
-                    f"{self.name}: friction between balls can't turn the point mass {body.name!r}; use add_body, leave "
-                    "out kinetic and static, or let it be a with radius_a = 0, a point."
-                )
+        body = self.a if self.a.dimension == 3 and self.radius_a else self.b
+        if self.has_friction and self.radius_b is not None and body.dimension == 3:
+            raise InvalidConstraint(
+                f"{self.name}: friction can't turn the point mass {body.name!r}; use add_body, leave out kinetic and "
+                "static, or make it a with radius_a = 0."
+            )
         if not isinstance(self.inside, bool):
             raise InvalidConstraint(f"{self.name}: inside must be True or False, got {shown(self.inside)}.")
         if self.inside and not (self.radius_b is not None and self.radius_a < self.radius_b):
@@ -135,8 +134,7 @@ class SphereContact(Unilateral, Joint):
         if self.radius_b is not None:
             share = (-1.0 if self.inside else 1.0) * self.radius_a / self._distance
             centers = {"center_a": self.center_a, "center_b": self.center_b}
-            kind = _PointOnSphere if self.a.dimension == 3 else SphereRolling
-            yield "contact", kind(self.a, self.b, **centers, distance=self._distance, share=share)
+            yield "contact", SphereRolling(self.a, self.b, **centers, distance=self._distance, share=share)
         elif self._is_point:
             for normal in (self.normal_b, *across(self.normal_b)):
                 point = self.center_b + self.radius_a * self.normal_b

@@ -27,6 +27,14 @@ E, B, H = 3, 12, 15  # where e_1, x_b and h_1 begin in x
 THIRD = (0.48, 0.6, 0.64)  # r_3, along h_j
 
 
+class _Direction(Vector):
+    """A direction of a ball; of a point mass, which has none, it counts for nothing: f is zero."""
+
+    def fitted(self, place, body, what, error):
+        """Return the coordinates."""
+        return place if body.dimension == 3 else super().fitted(place, body, what, error)
+
+
 class SphereRolling(Primitive):
     """A ball of a rolls on a ball of b, or in one: the rows of `SphereContact` with friction.
 
@@ -35,7 +43,8 @@ class SphereRolling(Primitive):
     distance : float, m
         Of the centres.
     share : float
-        Of the line from the centre of a to that of b at which they touch: 1/2 for equal balls, negative within b.
+        Of the line from the centre of a to that of b at which they touch: 1/2 for equal balls, negative within b, 0
+        where a is a point.
     first_a, second_a, third_a, first_b, second_b, third_b : array_like (3,)
         Directions at right angles.
 
@@ -60,7 +69,7 @@ class SphereRolling(Primitive):
     rate_rows = 2
     markers = (
         Point("a", "center_a"),
-        *(Vector("a", name) for name in ("first_a", "second_a", "third_a")),
+        *(_Direction("a", name) for name in ("first_a", "second_a", "third_a")),
         Point("b", "center_b"),
         *(Vector("b", name) for name in ("first_b", "second_b", "third_b")),
     )
@@ -76,6 +85,10 @@ class SphereRolling(Primitive):
         """Refuse a distance that is none."""
         if not 0.0 < number(self.distance) < np.inf:
             raise self.error(f"{self.name}: distance (m) of the centres must be positive, got {self.distance!r}.")
+        if self.a.dimension == 3 and self.share:
+            raise self.error(
+                f"{self.name}: the point mass {self.a.name!r} can't roll; share must be 0, or use add_body."
+            )
 
     @property
     def reach(self):
@@ -246,13 +259,3 @@ class SphereRolling(Primitive):
         """A random pair of balls; they need not touch."""
         places = {f"center_{body}": rng.normal(size=3) for body in "ab"}
         return cls(a, b, **places, distance=rng.uniform(0.5, 2.0), share=rng.uniform(0.2, 0.8))
-
-
-class _PointOnSphere(SphereRolling):
-    """The same of a point mass, which has no directions: e_j are of b, and don't count, since f = 0."""
-
-    markers = (
-        SphereRolling.markers[0],
-        *(Vector("b", marker.argument) for marker in SphereRolling.markers[1:4]),
-        *SphereRolling.markers[4:],
-    )

@@ -644,6 +644,8 @@ def test_bad_coefficients():
     for bodies, radius in (((block, ground), 0.1), ((ground, block), 0.0)):
         with pytest.raises(ts.InvalidConstraint, match="can't turn the point mass 'block'"):
             C.SphereContact(*bodies, radius_a=radius, radius_b=0.2, kinetic=0.3)
+    with pytest.raises(ts.InvalidConstraint, match="share must be 0"):
+        C.SphereRolling(block, ground, distance=1.0, share=0.2)
     body = scene.add_body(1.0, (1, 1, 1), position=(0, 0, 3))
     with pytest.raises(ts.InvalidConstraint, match="leave out slip=True"):
         C.RollingBall(body, ground, radius=0.5, normal_b=(0, 0, 1), slip=True, kinetic=0.3)

@@ -403,3 +403,59 @@ def test_balls_of_a_cradle_that_hang_at_rest_touch_without_a_reaction(count):
     np.testing.assert_allclose(
         [p for _, _, p in solution.impulses], speed * (1 - np.arange(1, count) / count), rtol=1e-8
     )
+
+
+def square_of_rate(angle, mu, first):
+    """Of a particle that slides on a ball of 1 m from an angle `first` off the top, at rest; angles rad, rates rad/s.
+
+    d(w^2)/da - 2 mu w^2 = 2 G (sin a - mu cos a) is linear.
+    """
+
+    def particular(a):
+        return G * ((4 * mu**2 - 2) * np.cos(a) - 6 * mu * np.sin(a)) / (1 + 4 * mu**2)
+
+    return particular(angle) - particular(first) * np.exp(2 * mu * (angle - first))
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.3])
+def test_a_particle_slides_off_a_rough_ball(mu):
+    first = np.arctan(mu) + 0.1
+    scene = ts.Scene(gravity=(0, 0, -G))
+    particle = scene.add_point_mass(2.0, position=(np.sin(first), 0, np.cos(first)), name="particle")
+    scene.add(C.SphereContact(particle, scene.ground, radius_a=0.0, radius_b=1.0, kinetic=mu, name="ball"))
+    solution = ts.simulate(scene, (0, 5), rtol=1e-12, atol=1e-13, dense_output=True)
+    leaves = brentq(lambda a: G * np.cos(a) - square_of_rate(a, mu, first), first, 1.5, xtol=1e-15)
+    (_, end, names), (_, _, none) = solution.phases
+    x, _, z = solution.at(end).position("particle")
+    assert (names, none) == (("ball",), ())
+    assert np.arctan2(x, z) == pytest.approx(leaves, abs=1e-12)
+    assert np.ptp(solution.energy - solution.work) < 1e-11
+
+
+def test_a_particle_comes_to_rest_in_a_rough_bowl():
+    """It slides down from the side, up the other side, and sticks there, as in the closed form."""
+    mu, static, first = 0.3, 0.4, -1.2  # off the bottom, where gravity has the other sign than on a ball
+    stops = brentq(lambda a: square_of_rate(a - np.pi, -mu, first - np.pi), first + 0.1, 1.0, xtol=1e-15)
+    assert 0.0 < stops < np.arctan(static)
+    scene = ts.Scene(gravity=(0, 0, -G))
+    particle = scene.add_point_mass(2.0, position=(np.sin(first), 0, -np.cos(first)), name="particle")
+    law = {"inside": True, "kinetic": mu, "static": static}
+    scene.add(C.SphereContact(particle, scene.ground, radius_a=0, radius_b=1, **law, name="bowl"))
+    solution = ts.simulate(scene, (0, 5), rtol=1e-12, atol=1e-13)
+    x, _, z = solution.position("particle")[-1]
+    assert len(solution.phases) == 2
+    assert solution.sticking("bowl")[-1]
+    assert np.arctan2(x, -z) == pytest.approx(stops, abs=1e-12)
+
+
+def test_a_particle_in_a_free_hollow_ball_keeps_the_momenta():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    shell = scene.add_body(3.0, (0.5, 0.7, 0.6), angular_velocity=(0.5, 0.2, 1.0), name="shell")
+    particle = scene.add_point_mass(1.0, position=(0.3, 0.1, 0), velocity=(1, 2, -0.5))
+    law = {"kinetic": 0.4, "restitution": 0.2}
+    scene.add(C.SphereContact(particle, shell, radius_a=0, radius_b=1, inside=True, **law, name="contact"))
+    solution = ts.simulate(scene, (0, 4), rtol=1e-11, atol=1e-12, dense_output=True)
+    assert solution.phases[-1][2] == ("contact",)
+    for momentum in (solution.linear_momentum, solution.angular_momentum):
+        assert np.ptp(momentum, axis=0).max() < 1e-12
+    assert np.diff(solution.energy - solution.work).max() < 1e-12

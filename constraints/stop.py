@@ -42,7 +42,9 @@ class Stop(Unilateral, Joint):
 
     Notes
     -----
-    One row for each bound: lower, upper. `solution.reaction(stop)` is that of both.
+    One row for each bound: lower, upper. `solution.reaction(stop)` is that of both. A bound counts as
+    `solution.angle(joint)` does, from the pose in which the joint was built; `scene.set(joint, angle=)` starts
+    elsewhere.
 
     Examples
     --------

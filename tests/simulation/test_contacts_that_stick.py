@@ -1,5 +1,7 @@
 """Contacts with friction at the bound of sticking: closed forms of what holds, and of how a slip begins."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -72,3 +74,35 @@ def test_rows_that_hold_a_box_are_independent_by_far(yaw):
     assert np.linalg.cond(rows / np.linalg.norm(rows, axis=1)[:, None]) < 20.0
     # With the points where corners are held, which the run remembers
     assert mobility_at(run._scene(), run.q, 0.0, run.filled().packed.system).degrees_of_freedom == 0
+
+
+def overhanging(aside):
+    """Three boxes, each beyond the one below by more than half of its width, `aside` (3,) from the middle; m."""
+    scene, size, off, below = ts.Scene(gravity=(0, 0, -G)), np.array((0.2, 0.2, 0.1)), 0.12, None
+    for i in range(3):
+        box = scene.add_body(**ts.shapes.box(size, density=1000.0), position=(off * i, aside[i], 0.05 + 0.1 * i))
+        corners, law = itertools.product((-0.1, 0.1), (-0.1, 0.1)), {"unilateral": True, "kinetic": 0.5}
+        for x, y in corners:
+            low = {"point_a": (x, y, -0.05), "normal_b": (0, 0, 1)}
+            if i == 0:
+                scene.add(C.PlaneContact(box, scene.ground, **low, **law))
+            elif x < 0.0:
+                scene.add(C.PlaneContact(box, below, **low, point_b=(0, 0, 0.05), **law))
+            else:
+                high = {"point_a": (x, y, 0.05), "point_b": (0, 0, -0.05), "normal_b": (0, 0, -1)}
+                scene.add(C.PlaneContact(below, box, **high, **law))
+        below = box
+    return scene
+
+
+def test_boxes_that_topple_slip_at_one_corner_first():
+    """In line both corners of an edge reach their bounds at once; aside, one before, one after, in proportion."""
+    aside, slips = 1e-3 * np.random.default_rng(0).normal(size=3), []
+    for share in (0.0, 0.5, 1.0):
+        solution = ts.simulate(overhanging(share * aside), (0, 0.163))
+        solution.raise_if_failed()
+        slips.append(np.array([end for _, end, _ in solution.phases[:-1] if end > 0.15]))
+    both, half, whole = slips
+    assert half[0] < both[0] - 1e-5
+    assert half[1] > both[0] + 1e-5
+    np.testing.assert_allclose(whole - both, 2.0 * (half - both), rtol=2e-3)

@@ -180,14 +180,20 @@ def solve_cone(G, b, mu, slip=None, given=None, bounds=(), rounding=0.0):
     rounding *= scale.max() / size
     problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip, given, others, rounding)
     p = np.zeros(3 * k)
+    nearest, least = None, CONE_SLIP
     with np.errstate(over="ignore", invalid="ignore"):  # where there is no solution
-        for left, counts in ((0.0, CONE_SWEEPS), (CONE_LEFT, CONE_SWEEPS[:1]), (CONE_SLIP, CONE_SWEEPS[:1])):
-            for sweeps in counts:
-                p = problem.swept(p, sweeps)
-                for factor in CONE_FACTORS if np.isfinite(p).all() else ():
-                    found = problem.newton(p, factor, left)
-                    if found is not None:
-                        return found * scale * size, problem.modes(found)
+        for sweeps in CONE_SWEEPS:
+            p = problem.swept(p, sweeps)
+            for factor in CONE_FACTORS if np.isfinite(p).all() else ():
+                found, left = problem.newton(p, factor)
+                if left <= least:
+                    nearest, least = found, left
+                if left == 0.0:
+                    break
+            if least == 0.0:
+                break
+    if nearest is not None:
+        return nearest * scale * size, problem.modes(nearest)
     return None, np.zeros(k, int)
 
 
@@ -301,26 +307,27 @@ class _Problem:
         _slope(*self.laws, y, D)
         return D
 
-    def newton(self, p, factor, left):
-        """A solution from a start; None where the method stalls with more than `left` of its terms.
+    def newton(self, p, factor):
+        """The nearest to a solution from a start, and how much of its terms is left, 0 within rounding.
 
-        In normal directions CONE_LEFT is left at most, beside rounding.
+        In normal directions CONE_LEFT is left at most, beside rounding; None, and infinite, where there is more.
         """
         F, y = self.residual(p, factor)
         eye, best, stalled = np.eye(p.size), np.inf, 0
         for _ in range(CONE_STEPS):
             size = np.abs(F).max()
             if not size < np.inf:
-                return None
+                break
             terms = 1.0 + (np.abs(self.G) @ np.abs(p)).max()
             if size <= SUM_ROUNDING * terms and size >= 0.5 * best:  # as far as rounding lets it
-                return self.image(y).ravel()  # without the rounding of zeros
+                return self.image(y).ravel(), 0.0  # without the rounding of zeros
             stalled = 0 if size < 0.5 * best else stalled + 1
             if size <= best:
                 best, normal, nearest = size, np.abs(F[::3]).max(), self.image(y).ravel()
             if stalled > CONE_STALLED:  # b of rows that depend on each other may disagree by rounding
-                most = (max(share * terms, self.rounding) for share in (left, CONE_LEFT))
-                return nearest if all(x <= y for x, y in zip((best, normal), most, strict=True)) else None
+                if normal > max(CONE_LEFT * terms, self.rounding):
+                    break
+                return nearest, 0.0 if best <= self.rounding else best / terms
             D = self.slope(y)
             step = _step(eye - product(D, eye - factor * self.G), D, -F)
             share = 1.0
@@ -331,7 +338,7 @@ class _Problem:
                     break
                 share *= 0.5
             p, F, y = trial, F_next, y_next
-        return None
+        return None, np.inf
 
     def swept(self, p, sweeps):
         """p after sweeps of Eqs. (1), (2) over the contacts in turn."""

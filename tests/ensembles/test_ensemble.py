@@ -1,5 +1,6 @@
 """Ensembles: every case has the bits of a run of its own, and no case ends another."""
 
+import copy
 import threading
 
 import numpy as np
@@ -64,6 +65,23 @@ def test_options_are_those_of_simulate(options):
         solution = alone(scene, table, i, **options)
         assert found.q[i].tobytes() == solution.state.q.tobytes()
         assert (found.status[i], found.message[i], found.t[i]) == (solution.status, solution.message, solution.reached)
+
+
+@pytest.mark.parametrize("change", [
+    lambda scene: setattr(scene["rod"], "length", 0.7), lambda scene: setattr(scene["bob"], "mass", 5.0),
+    lambda scene: setattr(scene["bob"], "name", "weight"), lambda scene: setattr(scene["bob"], "velocity", (0, 3, 0)),
+    lambda scene: scene.remove("rod"), lambda scene: scene.add_point_mass(1.0, name="other"),
+], ids=["length", "mass", "name", "start", "less", "more"])  # fmt: skip
+def test_cases_are_of_the_scene_as_it_was(change, tmp_path):
+    """Run again, copied and saved after a change of the scene; handles of the scene serve for them."""
+    scene = ball()
+    rod = scene["rod"]
+    found = ts.ensemble(scene, {"bob.velocity": [(0, 1, 0), (0, 2, 0)]}, SPAN)
+    expected = found.case(1)
+    change(scene)
+    for again in (found, copy.deepcopy(found), ts.load(found.save(tmp_path / "cases.h5"))):
+        assert again.case(1).q.tobytes() == expected.q.tobytes()
+    np.testing.assert_array_equal(found.case(1).reaction(rod)[0], expected.reaction("rod")[0])
 
 
 def test_geometry_of_joints():

@@ -596,6 +596,26 @@ def test_actions_that_cant_be_carried_out_end_the_run_with_an_account(action, sa
         solution.raise_if_failed()
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda scene: scene.activate("clutch"),
+        lambda scene: scene.remove("clutch"),
+        lambda scene: setattr(scene["load"], "mass", 2.0),
+        lambda scene: setattr(scene, "gravity", (0, 0, 1)),
+    ],
+)
+def test_an_action_that_changes_the_scene_is_refused(change):
+    """Such a change would count in some phases alone, or not at all; a new start is of other runs."""
+    scene, _ = rotors()
+    scene.add_point_mass(1.0, position=(5, 0, 0), name="stone")
+    start = lambda _: setattr(scene["stone"], "position", (6, 0, 0))  # noqa: E731
+    assert ts.simulate(scene, (0, 2), events=at(1.0, start)).state.position("stone")[0] == 5.0
+    solution = ts.simulate(scene, (0, 2), events=at(1.0, lambda _: change(scene)))
+    assert solution.status is ts.Status.ACTION_FAILED
+    assert "it has changed the scene" in solution.message
+
+
 def test_a_change_is_over_after_its_action():
     """What would do nothing raises; the state of the event stays readable."""
     scene, _ = rotors()

@@ -313,6 +313,11 @@ class SavedEnsemble(Ensemble):
             self._study.scene = self._scene()
         return super().case(i)
 
+    @property
+    def _scene_as_run(self):
+        """As of `Ensemble`."""
+        return self._study.scene
+
     def _scene_record(self):
         """As of `Ensemble`: that of the file."""
         known, text = {name: self._record[name] for name in ("scene", "lacks") if name in self._record}, self._given[0]

@@ -316,6 +316,8 @@ class Ensemble:
     def case(self, i: int) -> Solution:
         """Run a case again, alone, and return its Solution: of the bits of the ensemble, but for one in lanes.
 
+        Changes of the scene since then don't count.
+
         Raises
         ------
         InvalidArgument
@@ -326,7 +328,11 @@ class Ensemble:
         from ..simulation.prepared_run import simulate
 
         study, i = self._study, self._number_of(i)
-        return simulate(study.scene.with_parameters(self._values(i)), **study.given)
+        return simulate(self._scene_as_run.with_parameters(self._values(i)), **study.given)
+
+    @property
+    def _scene_as_run(self):
+        return self._study.scene_as_run
 
     def _values(self, i):
         """Values of a case by name, with those of its start."""
@@ -334,7 +340,7 @@ class Ensemble:
 
     def _scene_record(self):
         """Numbers and arrays of the scene, for a file."""
-        return scene_record(self._study.scene)
+        return scene_record(self._scene_as_run)
 
     @property
     def coordinates(self) -> list[str]:

@@ -305,6 +305,7 @@ class Study:
         alike = options.redundancy == "drop" and not self.has_phases
         self.has_workspace = alike and serves(self.family, self.kept, self.names)
         self.halt, self.idle = np.zeros(1, np.int64), []  # runners of the threads of an executor
+        self._known = scene.packed, scene._initial()
 
     def _retimes(self):
         """Whether the times of short changes of functions may differ from case to case, for scenes of one family."""
@@ -323,7 +324,16 @@ class Study:
 
     def __reduce__(self):
         """What is analysed is analysed again in another process."""
-        return Study, (self.scene, self.cases, self.options, self.call, self.keep, self.free, self.lanes)
+        return Study, (self.scene_as_run, self.cases, self.options, self.call, self.keep, self.free, self.lanes)
+
+    @property
+    def scene_as_run(self):
+        """The scene as it was; a copy where it has been changed since."""
+        packed, start = self._known
+        if self.scene._packed is not packed or self.scene._start is not start:
+            self.scene = packed_anew(self.family, self.changes)
+            self._known = self.scene.packed, self.scene._initial()
+        return self.scene
 
     @property
     def given(self):
@@ -338,7 +348,7 @@ class Study:
 
     def values(self, i):
         """Values of case i by name, with those of a consistent start."""
-        return started(self.scene, self.cases.values(i), self.span[0], self.free)
+        return started(self.scene_as_run, self.cases.values(i), self.span[0], self.free)
 
     def report(self, fraction, *more):
         """Of a run: end it if the ensemble has been stopped."""

@@ -15,7 +15,7 @@ from ..model.handles import handles_of
 from ..observables.evaluate import NO_INERTIA, constraint_arrays, mass_matrix
 from ..observables.state import EventInstant, begin_memory
 from ..validation import floats, listed, vector3
-from .phase_scenes import NAMED
+from .phase_scenes import NAMED, inactive_of
 from .variants import family_of, packed_anew, switchable
 
 if TYPE_CHECKING:
@@ -140,7 +140,8 @@ class Change:
         found = with_values(self._scene, values)
         if found.system.memory.size != self._scene.system.memory.size:
             raise InvalidArgument(
-                f"{parameter} can't be set within a run: forces would remember other numbers. Begin another run."
+                f"{parameter} can't be set within a run: forces would remember other numbers. Begin another run; a "
+                "contact whose friction comes or goes is to have a small coefficient instead of none."
             )
         self._values = values
 
@@ -192,10 +193,15 @@ def ask(run, events, last):
     """
     angles, slots = run.remembered[: run.count], run.remembered[run.count :]
     state = EventInstant(run.phases.packed[run.phases.of[-1]], slots, (run.t, last, angles), run.t, last)
-    change = Change(run.base, run.t, state, run.inactive, run.values)
+    change, known = Change(run.base, run.t, state, run.inactive, run.values), (run.base.packed, inactive_of(run.base))
     for event in events:
         try:
             event.action(change)
+            if _is_changed(run.base, *known):
+                raise InvalidArgument(
+                    "it has changed the scene, not the run; ask the Change instead: change.set, activate, deactivate, "
+                    "impulse."
+                )
         except Exception as error:
             said = str(error)
             end = "" if said.endswith((".", "?", "!")) else "."
@@ -203,6 +209,14 @@ def ask(run, events, last):
             return None
     change._over = True
     return change
+
+
+def _is_changed(scene, packed, inactive):
+    """Whether a scene isn't what it was, but for its start."""
+    from .stored_runs import hash_of
+
+    other = scene._packed is not packed
+    return other and (inactive_of(scene) != inactive or hash_of(scene.packed) != hash_of(packed))
 
 
 def _deep(run):

@@ -14,7 +14,7 @@ from .tolerances import (
     DISTANT,
     EARLY,
     FROM_REST,
-    MOST_PARTS,
+    MOST_DIVISIONS,
     ROOT,
     ROOT_STEPS,
     ROUGH_ROOT,
@@ -401,7 +401,7 @@ def find_first(search, context, run, first, second, arrays):
         width = end - t0
         if _first_root(s, step, scratch[0], width) != ARRIVED:
             parts += 1
-            if until == end or parts > MOST_PARTS:
+            if until == end or parts > MOST_DIVISIONS:
                 return UNSURE
             end = until
             continue

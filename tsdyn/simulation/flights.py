@@ -260,14 +260,18 @@ class Flights:
             workspace.address, again[1], length,
         )  # fmt: skip
         addresses = np.array([[search.address, *search.contexts] for search in searches], int)
-        closed, sizes = [*contacts.modes.closed, *contacts.modes.idle], contacts.scene.system.bodies[:, 1]
-        body = np.repeat(np.arange(len(sizes)), sizes)  # of each coordinate
-        held = np.isin(body, body[workspace.rows(contacts.t, contacts.q, closed)[0].any(axis=0)])
+        which, closed = [*contacts.modes.closed, *contacts.modes.idle], np.zeros(gaps.count, int)
+        held = np.zeros(0, int)
+        if which and place >= 0:
+            closed[which], sizes = 1, contacts.scene.system.bodies[:, 1]
+            body = np.repeat(np.arange(len(sizes)), sizes)  # of each coordinate
+            moved = workspace.rows(contacts.t, contacts.q, which)[0].any(axis=0)
+            held = np.flatnonzero(np.isin(body, body[moved]))
         self.parts = Flight(
             self.numbers, addresses, np.zeros(len(groups), int), gaps.sign, restitution, gaps.lengths(length),
-            np.empty((gaps.count, 2)), np.isin(np.arange(gaps.count), closed).astype(int), held.nonzero()[0],
-            np.zeros(workspace.m), np.zeros(now.shape), np.zeros(now.shape), memory.run.remembered.copy(),
-            np.zeros((4, now.shape[1])), memory.run.remembered.copy(), np.zeros((count, ROW)),
+            np.empty((gaps.count, 2)), closed, held, np.zeros(workspace.m), np.zeros(now.shape), np.zeros(now.shape),
+            memory.run.remembered.copy(), np.zeros((4, now.shape[1])), memory.run.remembered.copy(),
+            np.zeros((count, ROW)),
         )  # fmt: skip
         self.contacts, self.groups, (self._at, *self._keep) = contacts, groups, resident(self.parts)
 

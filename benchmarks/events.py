@@ -1,8 +1,9 @@
 """Cost of contacts: of an event beside the step that it ends, and of a step where contacts are watched.
 
-Balls bounce without loss, alone, as one of ten bodies, and ten at once; a stack of ten boxes with 40 contacts falls
-and comes to rest; pins of a chain stick and slide. Steps of ten boxes that slide on springs follow: without contacts,
-with 40 open ones, and on 30 points, three of each, in place of planar joints, bilateral ones and closed contacts.
+Balls bounce without loss, alone, as one of ten bodies, ten at once, and beside a box at rest; a stack of ten boxes with
+40 contacts falls and comes to rest; pins of a chain stick and slide. Steps of ten boxes that slide on springs follow:
+without contacts, with 40 open ones, and on 30 points, three of each, in place of planar joints, bilateral ones and
+closed contacts.
 Last a block that slides and stops, by the exact law of friction and by the regularised one. Runs of a group are
 interleaved; least times of rounds.
 
@@ -45,6 +46,14 @@ def _corners(scene, box, other, top, corners=4, unilateral=True, **law):
         corner = BOX * [x, y, -1]
         law |= {"normal_b": (0, 0, 1), "unilateral": unilateral}
         scene.add(ts.constraints.PlaneContact(box, other, point_a=corner, point_b=(0, 0, top), **law))
+
+
+def ball_beside_box():
+    """A ball that bounces beside a box at rest on four corners, and the span."""
+    scene, span = balls(1, 1)
+    (box,) = _boxes(scene, 1, (0, 0, 0), BOX[2])
+    _corners(scene, box, scene.ground, 0.0)
+    return scene, span
 
 
 def stack(count=10):
@@ -101,7 +110,8 @@ def least(calls):
 def main():
     """Print microseconds an event and a step."""
     scenes = {
-        "a ball": balls(1, 1), "one ball of ten": balls(10, 1), "ten balls": balls(10, 10), "a stack of ten": stack(),
+        "a ball": balls(1, 1), "one ball of ten": balls(10, 1), "ten balls": balls(10, 10),
+        "a ball beside a box": ball_beside_box(), "a stack of ten": stack(),
         "twenty rough pins": (friction.build(20, True, 0.0), (0.0, 0.1)),
     }  # fmt: skip
     seconds, found = least({name: lambda given=given: ts.simulate(*given) for name, given in scenes.items()})

@@ -151,3 +151,38 @@ def test_an_angle_that_stops_bound_beyond_a_turn(monkeypatch):
     np.testing.assert_allclose([t for t, *_ in solution.impulses], times, rtol=1e-13)
     end = 8.0 - rate * 0.9**5 * (37.0 - times[-1])  # after the fifth
     np.testing.assert_allclose(solution.state.angle(hinge), end, rtol=0, atol=1e-11)
+
+
+def beside_a_block(damping, speed=0.0):
+    """A ball that falls by 1 m without loss beside a block of 1 kg at rest on a floor, and a damper between them."""
+    scene = ball(velocity=(0, 0, -speed))
+    block = scene.add_point_mass(1.0, position=(0, 0.3, 0), name="block")
+    for axis in np.eye(3)[:2]:
+        scene.add(ts.constraints.Dot2(scene.ground, block, axis_a=axis, point_a=(0, 0.3, 0)))
+    scene.add(ts.constraints.PlaneContact(block, scene.ground, **FLOOR, name="rest"))
+    if damping:
+        scene.add(ts.forces.Spring(scene.body("body1"), block, damping=damping))
+    return scene
+
+
+def test_impacts_beside_contacts_that_are_closed(monkeypatch):
+    """Where an impact moves no body that they hold, they stay closed, and Python isn't asked."""
+    monkeypatch.setattr(_ContactRun, "_transit", lambda run, fired: pytest.fail(f"asked at {run.t}"))
+    solution, fall = ts.simulate(beside_a_block(0.0), (0.0, 20.0)), np.sqrt(2.0 / G)
+    times = [(1 + 2 * k) * fall for k in range(100) if (1 + 2 * k) * fall < 20.0]
+    np.testing.assert_allclose([t for t, *_ in solution.impulses], times, rtol=0, atol=HELD)
+    assert all(names == ("rest",) for *_, names in solution.phases)
+    np.testing.assert_array_equal(solution.position("block"), np.tile([0.0, 0.3, 0.0], (len(solution.t), 1)))
+
+
+def test_an_impact_after_which_a_damper_lifts_what_has_been_at_rest():
+    """By c u.v u_z - g at once, u from block to ball: the impact moves no body at rest, but ends its contact."""
+    solution = ts.simulate(beside_a_block(10.0, speed=40.0), (0.0, 0.1), rtol=1e-12, atol=1e-12)
+    hit = solution.impulses[0][0]
+    k = np.searchsorted(solution.t, hit, side="right") - 1  # after the impact
+    u = (solution.position("body1") - solution.position("block"))[k]
+    u /= np.linalg.norm(u)
+    gain = 10.0 * (u @ solution.velocity("body1")[k]) * u[2] - G
+    assert gain > G
+    assert solution.acceleration("block")[k, 2] == pytest.approx(gain, rel=1e-12)
+    assert [names for *_, names in solution.phases[:2]] == [("rest",), ()]

@@ -110,19 +110,16 @@ def angle(geometry, own, other, level):
     return second / (E * E + F * F)
 
 
-def all_angles(handles, q, qd=None):
-    """The angles of all joints of some `Handles` at q (n,), in (-pi, pi], and their rates with qd (n,); (count,)."""
-    motions = []
+def all_angles(handles, q):
+    """The angles (count,) of all joints of some `Handles` at q (n,), in (-pi, pi]."""
+    parameters = []
     for at, dimension in (handles.joints[:, :2].T, handles.joints[:, 2:].T):
-        p, pd, turns = np.tile(IDENTITY, (handles.count, 1)), np.zeros((handles.count, 4)), dimension == 7
-        for own, x in ((p, q), (pd, qd))[: 1 if qd is None else 2]:
-            own[turns] = x[at[turns, None] + np.arange(3, 7)]
-        motions.append((tuple(p.T), tuple(pd.T)))
+        p, turns = np.tile(IDENTITY, (handles.count, 1)), dimension == 7
+        p[turns] = q[at[turns, None] + np.arange(3, 7)]
+        parameters.append(tuple(p.T))
     f, g, h = (tuple(handles.frames[:, i : i + 3].T) for i in (0, 3, 6))
-    (p, pd), (o, od) = motions
-    v = seen(p, o, h)
-    found = np.arctan2(dot(g, v), dot(f, v))
-    return found if qd is None else (found, rate_of(f, g, v, subtract(seen(p, o, spin(o, od)), spin(p, pd))))
+    v = seen(*parameters, h)
+    return np.arctan2(dot(g, v), dot(f, v))
 
 
 def displacement(geometry, own, other, level):

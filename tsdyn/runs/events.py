@@ -12,7 +12,7 @@ from ..jit.interrupts import deferred_interrupts
 from ..jit.kernels import resident, twin
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
-from ..model.handles import all_angles, counted, handles_of
+from ..model.handles import handles_of
 from ..model.joint_turns import find_counted_angles
 from ..observables.state import EventInstant
 from ..validation import demand, demand_arguments, demand_numbers, is_count, number
@@ -320,12 +320,15 @@ class Watch:
             self.start = numbers.last
         self.begins_again, unsearched = numbers.ended == UNBEGUN, numbers.ended == UNSEARCHED
         if unsearched:
+            for group, result in zip(flights.groups[: numbers.searched], flights.parts.results.tolist(), strict=False):
+                group.kernel.result = result
             self.t, self.state, self.memory = numbers.t0, flights.parts.before.copy(), flights.parts.remembered.copy()
         else:
             self.t, self.state, self.memory = run.clock.t, run.now.copy(), run.remembered.copy()
         if numbers.ended == NOT_BEGUN:
             if run.numbers.begun:
-                self._at_start(flights.groups[0])  # says why
+                for group in flights.groups:
+                    self._at_start(group)  # says why
             run.numbers.begun = 1  # there is a run so far
         return status, numbers.used, unsearched
 
@@ -425,14 +428,6 @@ class Watch:
         find_counted_angles(joints.joints.ravel(), joints.frames, state, near, times - t0, rows, out)
         return out
 
-    def _angles(self, t, state):
-        """Counted angles (angles,) at a state within the step, by the rates at its start and here."""
-        t0, (q, qd, _), angles = self.beside
-        handles = handles_of(self.packed)
-        found, rates = all_angles(handles, *state[:2])
-        before, others = all_angles(handles, q, qd)
-        return counted(found, counted(before, angles) + 0.5 * (t - t0) * (others + rates))
-
     def _value(self, i, t, state):
         event = self.events[i]
         if isinstance(event.function, GroupMember):
@@ -530,7 +525,7 @@ class Watch:
             if self._ends(each.index):
                 self._add_beside(step, each)
                 if self.angles:
-                    run.remembered[: self.angles] = self._angles(each.t, each.state)
+                    run.remembered[: self.angles] = self._counted(np.array([each.t]), each.state[None])[0]
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each

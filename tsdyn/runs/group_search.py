@@ -14,7 +14,7 @@ from .tolerances import (
     DISTANT,
     EARLY,
     FROM_REST,
-    MOST_PARTS,
+    MOST_DIVISIONS,
     ROOT,
     ROOT_STEPS,
     ROUGH_ROOT,
@@ -401,7 +401,7 @@ def find_first(search, context, run, first, second, arrays):
         width = end - t0
         if _first_root(s, step, scratch[0], width) != ARRIVED:
             parts += 1
-            if until == end or parts > MOST_PARTS:
+            if until == end or parts > MOST_DIVISIONS:
                 return UNSURE
             end = until
             continue
@@ -508,6 +508,11 @@ class GroupSearch:
     n : int
     angles : int
         Of joints.
+
+    Attributes
+    ----------
+    result : int
+        Of the next step where a flight has searched it already, by `find_first`; else None.
     """
 
     def __init__(self, kernel, which, falls, known, spins, n, angles):
@@ -518,7 +523,7 @@ class GroupSearch:
             np.zeros(count), np.zeros((LARGEST + 5) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)),
             np.zeros((m, 4)), np.zeros(3), np.zeros((3, n)), np.zeros(m, int), np.zeros(angles), memory,
         )  # fmt: skip
-        self.address, self._keep = resident(self.parts)
+        (self.address, self._keep), self.result = resident(self.parts), None
 
     def at(self, t, now, near, memory):
         """Values (m,) at t and a state (3, n), and whether they are finite; near (angles,): of joints, roughly."""
@@ -539,8 +544,12 @@ class GroupSearch:
         numbers.t0, numbers.t1, (numbers.reader, context, run), numbers.new = step.t0, step.t1, reader.where, is_new
         numbers.just = step.just
         self._enter(step.near, step.memory)
-        contexts = self.address, context, run, *self.contexts
-        found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
+        found, self.result = self.result, None
+        if found is None:
+            contexts = self.address, context, run, *self.contexts
+            found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
+        elif found == CLEAR:
+            self.parts.value[:], self.parts.odd[:], numbers.new = self.parts.last, 0, 0
         if found == FOUND:
             known[numbers.t] = self.parts.state.copy()
         return None if found == UNSURE else numbers.found

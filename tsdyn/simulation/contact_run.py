@@ -377,8 +377,7 @@ class _ContactRun(Transitions, Checkpoints):
         if not flights.Flights.serve(memory, groups):
             return None
         bounce = self.gaps.restitution[self.able].any() and not self.gaps.rough[self.able].all()
-        plain = bounce and not self.frictions.count and self.modes.same(UnitModes())
-        plain = plain and self.is_sure and memory.begins_again
+        plain = bounce and not self.frictions.count and self.is_sure and memory.begins_again
         return flights.Flights(self, groups, memory, reader, plain)
 
     def land(self, flown):
@@ -392,7 +391,7 @@ class _ContactRun(Transitions, Checkpoints):
             self.phases.gain(energy)
             self.again.append(t)
         i, *opened = impacts[-1][1:5]
-        self.modes, self.at_once = UnitModes(opened={int(i): (self.t, *opened)}), 0
+        self.modes, self.at_once = replace(self.modes, opened={int(i): (self.t, *opened)}), 0
         self.q, self.ended, self.qdd, self.qd = flown.parts.struck.copy()
         self.remembered = flown.parts.noted.copy()
         self.judged = self.judged[0], self.judged[1] + flown.numbers.impacts

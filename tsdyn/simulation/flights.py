@@ -26,9 +26,9 @@ from ..runs.tolerances import LONG_STEPS, START_ZERO
 from ..workspaces import load_run
 from .tolerances import ACCUMULATED, EVENTS_JUDGED, FLIGHT, PENETRATION, PUSHED, ROUNDED
 
-# Where nothing of the user's is asked, a phase is steps, which are searched for its end. Where all gaps are open and
-# there is no friction, the impact of one gap, which opens again, is made here, too. What is more is left to Python:
-# there the last step is searched once more. Python takes over the impacts of a call afterwards.
+# Where nothing of the user's is asked, a phase is steps, which are searched for its end. The impact of one gap without
+# friction, which opens again, is made here, too, where it moves no body that closed contacts hold. What is more is left
+# to Python, with the results of the search. Python takes over the impacts of a call afterwards.
 
 SLICE_DONE = int(Status.SLICE_DONE)
 ROW = 7  # numbers of an impact
@@ -43,8 +43,8 @@ class FlightNumbers(Record):
     restart: int  # `run_memory.Restart`
     reader: int  # contexts of what reads states
     read_run: int
-    bounces: int  # whether impacts are made here
-    rows: int  # contexts of the gaps
+    gaps: int  # which group is that of gaps, and their contexts; -1 where no impacts are made here
+    rows: int
     own: int
     contacts: int  # `ContactParts`
     impact: int  # `contact_rows.Impact`
@@ -56,6 +56,7 @@ class FlightNumbers(Record):
     new: int  # whether no step has been searched since the run has begun
     t0: float  # s, where the last step began
     ended: int  # see `fly`
+    searched: int  # groups that the last step has been searched for, where Python is to go on
 
 
 class Flight(NamedTuple):
@@ -63,12 +64,15 @@ class Flight(NamedTuple):
 
     numbers: FlightNumbers
     searches: np.ndarray  # int64 (groups, 3)  `SearchParts` of each group, and two contexts of its functions
+    results: np.ndarray  # int64 (groups,)  of `find_first` in the last step
     sign: np.ndarray  # (gaps,)
     restitution: np.ndarray  # (gaps,)  zero of those whose impacts are left to Python
     lengths: np.ndarray  # (gaps,)  what rounding of gaps is a part of
     hits: np.ndarray  # (gaps, 2)  time and rate of the last impact, as `_ContactRun.hits` has them; infinite before
-    least: np.ndarray  # (m,)  rounding of the functions
+    closed: np.ndarray  # int64 (gaps,)  1 of those that are closed,
+    held: np.ndarray  # int64  and coordinates of their bodies
     gaps: np.ndarray  # scratch
+    after: np.ndarray  # (3, n)  scratch
     before: np.ndarray  # (3, n)  q, qd, qdd where the last step began
     remembered: np.ndarray  # and what was remembered there
     struck: np.ndarray  # (4, n)  q, qd, qdd at the last impact, and qd afterwards
@@ -79,8 +83,8 @@ class Flight(NamedTuple):
 _none = np.zeros((0, 0))
 load_flight = loader(
     Flight(
-        FlightNumbers(), np.zeros((0, 0), int), *np.zeros((3, 0)), _none, *np.zeros((2, 0)), _none, np.zeros(0), _none,
-        np.zeros(0), _none,
+        FlightNumbers(), np.zeros((0, 0), int), np.zeros(0, int), *np.zeros((3, 0)), _none, *np.zeros((2, 0), int),
+        np.zeros(0), _none, _none, np.zeros(0), _none, np.zeros(0), _none,
     )
 )  # fmt: skip
 
@@ -95,6 +99,25 @@ def is_pushed(t, v, now, low, rate, e):  # six: two hits
 
 
 @kernel
+def _leaves_others(f, t, q, rows):
+    """Whether an impact, rows as of `Impact`, moves no body of a closed contact, and ends no other event's mode."""
+    for j in range(f.held.size):
+        if rows[1, f.held[j]] != 0.0:
+            return False
+    copy(q, f.after[0])
+    copy(rows[2], f.after[1])
+    copy(rows[3], f.after[2])
+    for k in range(f.searches.shape[0]):
+        s = load_search(f.searches[k, 0])
+        if k != f.numbers.gaps:
+            begin_functions(s, f.searches[k, 1], f.searches[k, 2], t, f.after, s.last)
+            for j in range(s.last.size):
+                if not s.falls[j] * s.last[j] < 0.0:
+                    return False
+    return True
+
+
+@kernel
 def _strike(f, r, s, i, t):
     """The impact of gap i at t and the state of a search, noted; False where it is more than that of one gap."""
     n, c, w, limit = f.numbers, load_contacts(f.numbers.contacts), load_impact(f.numbers.impact), f.lengths
@@ -106,13 +129,15 @@ def _strike(f, r, s, i, t):
     q, qd = s.state[0], s.state[1]
     find_gaps_within(c.rows, load_open_gaps(n.own), t, s.state, n.t0, f.before, s.near, f.gaps)
     for j in range(f.sign.size):
-        if j != i and f.gaps[j] <= START_ZERO * limit[j]:
+        if j != i and f.closed[j] == 0 and f.gaps[j] <= START_ZERO * limit[j]:
             return False
     x = w.numbers
     x.i, x.sign, x.e, x.lowest = i, f.sign[i], f.restitution[i], FLIGHT * n.length
     if x.e == 0.0 or f.gaps[i] < -PENETRATION * limit[i]:
         return False
     if call_bounce(x.kernel, n.contacts, n.impact, t, q, qd, r.remembered[r.joints.shape[0] :]) != BOUNCES:
+        return False
+    if not _leaves_others(f, t, q, w.rows):
         return False
     hit, low = f.hits[i], ACCUMULATED * limit[i]
     if is_pushed(hit[0], hit[1], t, low, x.rate / x.e, x.e):
@@ -143,7 +168,7 @@ def fly(flight, log, most):
     n = f.numbers
     r, at = load_run(n.run), seen(log)
     status, stiff, angles = SLICE_DONE, r.numbers.stiff, r.joints.shape[0]
-    n.impacts, n.used, n.ended = 0, 0, 0
+    n.impacts, n.used, n.ended, n.searched = 0, 0, 0, 0
     while n.used < most:
         for j in range(3):
             copy(r.now[j], f.before[j])
@@ -156,25 +181,28 @@ def fly(flight, log, most):
                 n.ended = UNSEARCHED
                 return status
             arrays = StepArrays(f.before, r.now, r.block, log.charts, log.points)
-            found = CLEAR
+            left = False  # to Python
             for k in range(f.searches.shape[0]):
                 s = load_search(f.searches[k, 0])
                 copy(f.remembered[: s.near.size], s.near)
                 copy(r.remembered[angles : angles + s.memory.size], s.memory)
                 s.numbers.t0, s.numbers.t1, s.numbers.just, s.numbers.new = n.t0, r.clock.t, r.clock.t, n.new
                 given = n.reader, n.read_run, f.searches[k, 1], f.searches[k, 2]
-                found = call_find(s.numbers.finder, f.searches[k, 0], *given, seen(arrays))
-                if found != CLEAR:
+                f.results[k] = call_find(s.numbers.finder, f.searches[k, 0], *given, seen(arrays))
+                n.searched = k + 1
+                left = f.results[k] != CLEAR and (f.results[k] != FOUND or k != n.gaps)
+                if left:
                     break
-            s = load_search(f.searches[0, 0])
-            if found == CLEAR:
+            s = load_search(f.searches[max(n.gaps, 0), 0])
+            if not left and (n.gaps < 0 or f.results[n.gaps] == CLEAR):
                 for k in range(f.searches.shape[0]):
                     take_step(load_search(f.searches[k, 0]))
-                n.new = 0
-            elif found != FOUND or n.bounces == 0 or not _strike(f, r, s, s.which[s.numbers.found], s.numbers.t):
+                n.new, n.searched = 0, 0
+            elif left or not _strike(f, r, s, s.which[s.numbers.found], s.numbers.t):
                 n.ended = UNSEARCHED
                 return status
             else:
+                n.searched = 0
                 for j in range(angles):
                     r.remembered[j] = angle_after(r, j, s.state[0], s.state[1], s.numbers.t - r.clock.t)
                 end_step(r, log, s.numbers.t, n.t0, s.state)
@@ -186,11 +214,15 @@ def fly(flight, log, most):
                 go_back(load_restart(n.restart), r, log)
                 n.used += 1
                 status, n.new = call_driver(n.driver, n.context, n.run, at, -1), 1
-                copy(f.least, s.noise)
-                copy(r.remembered[: s.near.size], s.near)
-                if r.numbers.begun == 0 or begin_functions(s, n.rows, n.own, r.clock.t, r.now, s.value) == 0:
-                    n.ended = NOT_BEGUN
-                    return status
+                for k in range(f.searches.shape[0]):
+                    s = load_search(f.searches[k, 0])
+                    copy(s.least, s.noise)
+                    copy(r.remembered[: s.near.size], s.near)
+                    s.odd[:] = 0
+                    own = f.searches[k, 1], f.searches[k, 2]
+                    if r.numbers.begun == 0 or begin_functions(s, *own, r.clock.t, r.now, s.value) == 0:
+                        n.ended = NOT_BEGUN
+                        return status
         full = r.numbers.chart_rows + 2 >= log.charts.shape[0]
         if status != SLICE_DONE or full or r.numbers.stiff != stiff:
             return status
@@ -211,7 +243,7 @@ class Flights:
     memory : Memory
     reader : Reader
     bounces : bool
-        Whether impacts are made: there is one group, of gaps.
+        Whether impacts are made.
     """
 
     def __init__(self, contacts, groups, memory, reader, bounces):
@@ -222,16 +254,24 @@ class Flights:
         for search in searches:
             search.numbers.reader, context, run = reader.where
         again = memory.restart[0], workspace.impact[1]
+        place = next((k for k, group in enumerate(groups) if bounces and group.over == contacts.closing.over), -1)
         self.numbers = FlightNumbers(
-            memory.driver.address, *memory.where, again[0], context, run, int(bounces), *searches[0].contexts,
+            memory.driver.address, *memory.where, again[0], context, run, place, *searches[place].contexts,
             workspace.address, again[1], length,
         )  # fmt: skip
         addresses = np.array([[search.address, *search.contexts] for search in searches], int)
-        least = groups[0].least
+        which, closed = [*contacts.modes.closed, *contacts.modes.idle], np.zeros(gaps.count, int)
+        held = np.zeros(0, int)
+        if which and place >= 0:
+            closed[which], sizes = 1, contacts.scene.system.bodies[:, 1]
+            body = np.repeat(np.arange(len(sizes)), sizes)  # of each coordinate
+            moved = workspace.rows(contacts.t, contacts.q, which)[0].any(axis=0)
+            held = np.flatnonzero(np.isin(body, body[moved]))
         self.parts = Flight(
-            self.numbers, addresses, gaps.sign, restitution, gaps.lengths(length), np.empty((gaps.count, 2)), least,
-            np.zeros(workspace.m), np.zeros(now.shape), memory.run.remembered.copy(), np.zeros((4, now.shape[1])),
-            memory.run.remembered.copy(), np.zeros((count, ROW)),
+            self.numbers, addresses, np.zeros(len(groups), int), gaps.sign, restitution, gaps.lengths(length),
+            np.empty((gaps.count, 2)), closed, held, np.zeros(workspace.m), np.zeros(now.shape), np.zeros(now.shape),
+            memory.run.remembered.copy(), np.zeros((4, now.shape[1])), memory.run.remembered.copy(),
+            np.zeros((count, ROW)),
         )  # fmt: skip
         self.contacts, self.groups, (self._at, *self._keep) = contacts, groups, resident(self.parts)
 

@@ -45,13 +45,14 @@ def test_a_slip_that_does_not_slide_has_no_direction():
     s, none = np.zeros((3 + HEADING_ROWS, 3)), np.zeros(3)
     s[:3, :2] = 1.0
     assert not any(any(twin(heading_series)(s, 0, 3, none, 1.0, k)) for k in range(3))
-    assert not any(twin(heading)(1.0, 2.0, 3.0, none, 1.0)) and not any(twin(heading)(0.0, 0.0, 0.0, none, 1.0))
+    assert not any(twin(heading)(1.0, 2.0, 3.0, none, 1.0))
+    assert not any(twin(heading)(0.0, 0.0, 0.0, none, 1.0))
 
 
 @pytest.mark.parametrize(
     ("seed", "most"),
-    [(5002051, 2), pytest.param(6000308, 3, marks=pytest.mark.slow), pytest.param(5002025, 2, marks=pytest.mark.slow)],
-    ids=["stiff", "long steps from rest", "taylor"],
+    [(5002025, 2), pytest.param(5002051, 2, marks=pytest.mark.slow), pytest.param(6000308, 3, marks=pytest.mark.slow)],
+    ids=["taylor", "stiff", "long steps from rest"],
 )
 def test_coins_that_begin_to_slip_across_their_load(seed, most):
     """The load of a coin that rolls turns faster than it grows: the slip was along a line at the wrong side."""
@@ -107,7 +108,7 @@ def test_a_tripod_slides_and_spins_to_rest(speed, spin):
     end = solution.phases[-1][0]
     assert 0.0 < end - known.t[-1] < 2e-7
     np.testing.assert_allclose(solution.position("plate")[-1], [*known.y[:2, -1], 0.0], atol=1e-11)
-    assert not solution.velocity("plate")[-1].any() and not solution.angular_velocity("plate")[-1].any()
+    assert not solution.qd[-1].any()
 
 
 def test_a_ball_rolls_in_a_bowl_that_turns():
@@ -133,5 +134,6 @@ def test_a_ball_rolls_in_a_bowl_that_turns():
     ball = scene.add_body(m, np.full(3, inertia), (R - r) * start, velocity=v, angular_velocity=spin, name="ball")
     scene.add(C.SphereContact(ball, bowl, radius_a=r, radius_b=R, inside=True, kinetic=2.0, name="wall"))
     solution = ts.simulate(scene, (0, 2), rtol=1e-11, atol=1e-12)
-    assert solution.success and solution.sticking("wall").all()
+    assert solution.success
+    assert solution.sticking("wall").all()
     np.testing.assert_allclose(solution.position("ball")[-1], known.y[:3, -1], atol=1e-9)

@@ -78,7 +78,7 @@ class SphereRolling(Primitive):
             raise self.error(f"{self.name}: distance (m) of the centres must be positive, got {self.distance!r}.")
 
     @property
-    def reach(self):
+    def reach(self) -> float:
         """The distance of the centres, m."""
         return float(self.distance)
 

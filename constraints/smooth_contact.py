@@ -87,7 +87,7 @@ class SmoothContact(Primitive):
         not_negative(self.tyre_radius, f"{self.name}: tyre_radius (m)", self.error)
 
     @property
-    def reach(self):
+    def reach(self) -> float:
         """The largest semi-axis, and R, m."""
         return float(floats(self.semi_axes).max()) + float(self.tyre_radius)
 

@@ -91,7 +91,7 @@ class SphereRolling(Primitive):
             )
 
     @property
-    def reach(self):
+    def reach(self) -> float:
         """The distance of the centres, m."""
         return float(self.distance)
 

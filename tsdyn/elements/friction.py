@@ -52,7 +52,7 @@ def sliding(vv, par):
 
 @kernel
 def heading(v0, v1, v2, d, v_0):
-    """e = v / |v| while v is within 90 degrees of d (3,), and along d where |v| is far below D = v_0 |d|; zero where d is.
+    """e = v / |v| while v is within 90 degrees of d (3,), along d where |v| is far below D = v_0 |d|; zero where d is.
 
     u = d d.d + (v d.d - d d.v) d.d v.v / ((v.v + D^2) sqrt((d.v)^2 + D^2 d.d)),  e = u / |u|:  analytic at v = 0, and
     constant where v has the direction of d, whatever its sign. From D on it is against what v has across d, whatever
@@ -123,8 +123,8 @@ HEADING_ROWS = 15
 @kernel
 def heading_series(s, v, first, d, v_0, k):
     """Coefficient k, a tuple of three, of `heading`; v in rows v to v + 2 of s, HEADING_ROWS rows are its own."""
-    # a = d.v, (d.v)^2 + D^2 d.d, its inverse root, u (3), v d.d - d d.v (6), u.u, its inverse root, d.d over the root (11),
-    # v.v + D^2, their quotient, and what u has across d over (6)
+    # Rows of d.v, (d.v)^2 + D^2 d.d and its inverse root (0), u (3), v d.d - d d.v (6), u.u and its inverse root (9),
+    # d.d over the first root, v.v + D^2, their quotient (11), and the factor of the rows from 6 on in u (14)
     a, u, zero = first, first + 3, 1.0 if k == 0 else 0.0
     b = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
     least = v_0 * v_0 * b + TINY

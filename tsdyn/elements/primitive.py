@@ -130,7 +130,7 @@ class Primitive(Attachment):
     others: tuple[AnyBody, ...] = ()  # bodies beyond a and b that a term of a sum reads
     others_at = 0  # their first parameter; pack() fills in three for each
     anywhere = False  # whether rows on velocities hold wherever positions are, though they could be integrated
-    reach = 0.0  # m, the largest length of its own, such as the radius of a ball, beside the coordinates of points
+    reach: float = 0.0  # m, the largest length of its own, such as a radius, beside the coordinates of points
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind

@@ -15,7 +15,7 @@ from ..runs.group_search import VALUES, KernelFunctions
 from ..workspaces import load_parts
 from .grips import carried, gap_row, slip_columns
 from .phase_scenes import first_row_of
-from .tolerances import BEGINS, FASTER, SLOW, TURNED
+from .tolerances import BEGINS, FASTER, KEPT, SLOW, TURNED
 
 # Reactions
 
@@ -206,6 +206,8 @@ def find_unit_slips(contacts, own, t, state, out, t0, before, near):  # eight: V
             h = turned / (turned + (TURNED * v) * (TURNED * v) + x.rounding[i] * x.rounding[i] + TINY)
         c = 0.5 + h * V / (v + V)  # from 1 on a slip has turned too far
         value = along - c * across / math.sqrt(max(1.0 - c * c, TURNED * TURNED))
+        if x.since[i] == math.inf and v > FASTER * V:
+            value = max(value, KEPT * v)
         begun, gain = x.begun[0, i], x.begun[1, i]
         if gain > 0.0:
             value = value / (t - begun) if t > begun else gain
@@ -222,7 +224,9 @@ class Halting(KernelFunctions):
     below which friction has this direction. A slip turns by 60 degrees at v >> V; where it has turned at all when it is
     as slow as V, it takes its direction there, so that it ends with its own. One that hasn't been FASTER V at the start
     of a step since its phase began has h = BEGINS, and turns by 8 degrees at v << V: it begins, or has its direction
-    from there. Where it begins at rest, the value is divided by the time since: the slip may turn at once.
+    from there. Where it begins at rest, the value is divided by the time since: the slip may turn at once. In the step
+    in which it becomes faster the value is KEPT |v| at least: one that has turned too far before its value was above
+    zero, as in a long step from rest, takes its direction where the next step begins.
 
     Parameters
     ----------

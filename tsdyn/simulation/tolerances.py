@@ -84,8 +84,9 @@ SAME_WAY, SLOW = 1.0 - 1e-12, 100.0
 # rad: a slip that has turned by more takes its direction anew before it ends; reactions change by as much, of their
 # size. Velocity over V that tells it from one that begins.
 TURNED, FASTER = 1e-7, 4.0
-# By how much the cosine of the turn of a slip that begins is above 1/2 at least, at rest.
-BEGINS = 0.49
+# By how much the cosine of the turn of a slip that begins is above 1/2 at least, at rest. Share of a slip that its
+# event function is at least in the step in which it becomes fast: any above its rounding.
+BEGINS, KEPT = 0.49, 0.1
 
 # Load of a friction over that up to which it counts as none, from which on it counts.
 LOADED = 4.0

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tsdyn.stress import judgement, laws
-from tsdyn.stress.contact_scenes import Action
+from tsdyn.stress.contact_scenes import Intervention
 from tsdyn.stress.random_scenes import CONTACTS, DrawnCase, drawn
 
 C = ts.constraints
@@ -236,7 +236,7 @@ def test_an_error_that_does_not_fall_with_the_tolerance_is_found():
 def test_impulses_of_actions_are_judged(share, sound):
     """A kick of the user's at an instant of its own."""
     scene, kick = bounces(), np.array((0.3, 0.0, 2.0))
-    events = [Action(("impulse", "ball", kick), t=0.1)]
+    events = [Intervention(("impulse", "ball", kick), t=0.1)]
     solution = ts.simulate(scene, (0.0, 0.2), events=events, dense_output=True).raise_if_failed()
     given = [(solution.t_events[0], scene["ball"], share * kick)]
     found = {found.law for found in laws.findings(solution, given) if found.broken}

@@ -253,7 +253,7 @@ def rough_ropes(d, n):
         last, place = body, place + np.array((1.0, 0.0, 0.0))
 
 
-class Action:
+class Intervention:
     """An event at an instant, or where a body is as high as at the start, with an action.
 
     asked: name of a method of `Change`, and its arguments; gives: impulse of the user's (3,), N s, on a body, or None.
@@ -289,10 +289,10 @@ def hybrid(d, n):
             d.scene.add(joints.Distance(tied[-1], ball, name=f"rod {i}"))
             asked += [("deactivate", f"rod {i}"), ("activate", f"wind {i - 1}")]
         tied.append(ball)
-        actions += [Action(each, t) for each, t in zip(asked, T * d.rng.uniform(0.0, 0.5, 4), strict=False)]
+        actions += [Intervention(each, t) for each, t in zip(asked, T * d.rng.uniform(0.0, 0.5, 4), strict=False)]
         kick = ball.mass * L / T * d.rng.normal(size=3)
         given = {"t": T * d.rng.uniform(0.0, 0.5)} if d.rng.random() < 0.7 else {"body": ball}
-        actions.append(Action(("impulse", ball, kick), **given, gives=(ball, kick)))
+        actions.append(Intervention(("impulse", ball, kick), **given, gives=(ball, kick)))
     arm = d.body(np.array((0.5, 2.0, 0.5)), rigid=True)
     hinge = d.scene.add(joints.Revolute.at(d.scene.ground, arm, point=d.place((0.0, 2.0, 0.5)), axis=(0.0, 1.0, 0.0)))
     d.scene.add(joints.Stop(hinge, -d.rng.uniform(0.0, 0.4), d.rng.uniform(0.1, 0.6), **_law(d, e)))

@@ -445,10 +445,11 @@ def unilateral(solution):
 
 
 def phases(solution):
-    """Phases follow each other: each begins where the one before it ends."""
+    """Phases follow each other: each begins where the one before it ends, and ends no sooner."""
     if solution._phases is not None:
         begin, end = np.array([each[:2] for each in solution.phases]).T
-        yield Finding("phases in a row", float(np.abs(begin[1:] - end[:-1]).max(initial=0.0)), 0.0)
+        off = np.abs(begin[1:] - end[:-1]).max(initial=0.0), (begin - end).max(initial=0.0)
+        yield Finding("phases in a row", float(max(off)), 0.0)
 
 
 def rubbing(solution):

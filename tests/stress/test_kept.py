@@ -7,7 +7,7 @@ from tsdyn.errors import Status
 from tsdyn.runs import driver
 from tsdyn.stress import judgement
 from tsdyn.stress.judgement import judge_case, run_case
-from tsdyn.stress.laws import same_bits
+from tsdyn.stress.laws import phases, same_bits
 from tsdyn.stress.random_scenes import CONTACTS, drawn, generate
 
 KEPT = {
@@ -121,3 +121,12 @@ def test_a_phase_that_a_checkpoint_begins_knows_no_slips_of_the_one_before():
     """Those that had been fast by then had ended: the first turn of a slip from rest came 0.13 s early."""
     case = drawn(np.random.default_rng(6000008), 1, 3, {"shaken": CONTACTS["shaken"]})
     assert judge_case(case, (judgement.stopped,)).word == str(Status.SUCCESS)
+
+
+@pytest.mark.slow
+def test_a_phase_that_ends_before_its_last_flights_would_has_no_negative_length():
+    """Corners of two boxes hit each other some hundred times; phases of the list begin where flights end."""
+    case = drawn(np.random.default_rng(6000450), 1, 3, {"stack": CONTACTS["stack"]})
+    solution = run_case(case, max_steps=1500)
+    assert len(solution.phases) > 400
+    assert not any(found.broken for found in phases(solution))

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tsdyn.stress import judgement, laws
+from tsdyn.stress.contact_scenes import Intervention
 from tsdyn.stress.random_scenes import CONTACTS, DrawnCase, drawn
 
 C = ts.constraints
@@ -229,3 +230,20 @@ def test_an_error_that_does_not_fall_with_the_tolerance_is_found():
         case, right(case), lambda case, **o: (wrong if "integrator" in o else right)(case, **o)
     )
     assert found.broken
+
+
+@pytest.mark.parametrize(("share", "sound"), [(1.0, True), (1.0 + 1e-6, False)])
+def test_impulses_of_actions_are_judged(share, sound):
+    """A kick of the user's at an instant of its own."""
+    scene, kick = bounces(), np.array((0.3, 0.0, 2.0))
+    events = [Intervention(("impulse", "ball", kick), t=0.1)]
+    solution = ts.simulate(scene, (0.0, 0.2), events=events, dense_output=True).raise_if_failed()
+    given = [(solution.t_events[0], scene["ball"], share * kick)]
+    found = {found.law for found in laws.findings(solution, given) if found.broken}
+    assert found == (set() if sound else {"momenta at an impact"})
+
+
+@pytest.mark.slow
+def test_a_hybrid_scene_is_judged():
+    case = drawn(np.random.default_rng(7000003), 1, 3, {"hybrid": CONTACTS["hybrid"]})
+    assert judgement.judge_case(case, (judgement.once_more,)).word == "success"

@@ -157,14 +157,18 @@ class Phases:
         return kind
 
     def add(self, kind, begin, rest, end, names, changes):
-        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights that are none end."""
+        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights that are none end.
+
+        Or would end, if nothing happened before.
+        """
+        rest = min(rest, end)
         self.changes.append(changes)
         if self.list:
             begun, _, held = self.list[-1]
-            self.list[-1] = (min(begun, rest), rest, held)
+            self.list[-1] = (begun, rest, held)
         self.starts.append(begin)
         self.of.append(kind)
-        self.list.append((rest, max(rest, end), names))
+        self.list.append((rest, end, names))
 
     def gain(self, energy):
         """Add kinetic energy, J, that is gained where the next phase begins."""

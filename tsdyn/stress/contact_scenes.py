@@ -253,5 +253,58 @@ def rough_ropes(d, n):
         last, place = body, place + np.array((1.0, 0.0, 0.0))
 
 
+class Intervention:
+    """An event at an instant, or where a body is as high as at the start, with an action.
+
+    asked: name of a method of `Change`, and its arguments; gives: impulse of the user's (3,), N s, on a body, or None.
+    """
+
+    def __init__(self, asked, t=None, body=None, gives=None):
+        self.asked, self.t, self.gives = asked, t, gives
+        self.place = None if body is None else body.position[2]
+        self.body, self.direction = body, -1 if t is None else 0
+
+    def __call__(self, t, state):
+        """Zero at the event."""
+        return t - self.t if self.t is not None else state.position(self.body)[2] - self.place
+
+    def action(self, change):
+        """Ask for it."""
+        name, *given = self.asked
+        getattr(change, name)(*given)
+
+
+def hybrid(d, n):
+    """Balls on a rough floor, tied by rods that are let go, and kicked; a pendulum between stops with a sampled law."""
+    e, rubs, L, T, tied, actions = _upright(d), _rubs(d), d.length, d.time, [], []
+    for i in range(min(n, 3)):
+        ball = d.scene.add_body(**sphere(0.1 * L, mass=d.mass * d.rng.uniform(0.3, 3.0)), name=f"ball {i}")
+        ball.position = L * np.array((0.5 * i, 0.0, 0.1 + d.rng.choice((0.0, 0.2))))
+        ball.velocity = _thrown(d, 0.5)[0] * (1.0, 1.0, 0.0)
+        floor = {"radius_a": 0.1 * L, "normal_b": UP, "name": f"floor {i}"}
+        d.scene.add(joints.SphereContact(ball, d.scene.ground, **floor, **_law(d, e), **rubs))
+        d.scene.add(forces.PointForce(ball, force=0.5 * d.mass * L / T**2 * d.unit(), name=f"wind {i}"))
+        asked = [("set", f"floor {i}.restitution", float(d.rng.choice(RESTITUTIONS))), ("deactivate", f"wind {i}")]
+        if tied:
+            d.scene.add(joints.Distance(tied[-1], ball, name=f"rod {i}"))
+            asked += [("deactivate", f"rod {i}"), ("activate", f"wind {i - 1}")]
+        tied.append(ball)
+        actions += [Intervention(each, t) for each, t in zip(asked, T * d.rng.uniform(0.0, 0.5, 4), strict=False)]
+        kick = ball.mass * L / T * d.rng.normal(size=3)
+        given = {"t": T * d.rng.uniform(0.0, 0.5)} if d.rng.random() < 0.7 else {"body": ball}
+        actions.append(Intervention(("impulse", ball, kick), **given, gives=(ball, kick)))
+    arm = d.body(np.array((0.5, 2.0, 0.5)), rigid=True)
+    hinge = d.scene.add(joints.Revolute.at(d.scene.ground, arm, point=d.place((0.0, 2.0, 0.5)), axis=(0.0, 1.0, 0.0)))
+    d.scene.add(joints.Stop(hinge, -d.rng.uniform(0.0, 0.4), d.rng.uniform(0.1, 0.6), **_law(d, e)))
+    size, gain = 0.3 * arm.mass * 9.81 * L**2 / T**2, d.rng.uniform(0.0, 0.05)  # less than the weight's
+
+    def law(t, state):
+        return size * (np.sin(20.0 * t / T) - gain * T * state.angle_rate(hinge))
+
+    d.scene.add(forces.Control(law, actuators=[hinge], period=d.rng.uniform(0.01, 0.1) * T))
+    d.options["events"], d.assembled = actions, True
+
+
 CONTACTS = {each.__name__: each for each in (balls, cradle, stack, chain_over_floor, stops, ropes, play)}
 LATER_CONTACTS = {each.__name__: each for each in (bowl, coins, shaken, rough_ropes)}
+ACTIONS = {hybrid.__name__: hybrid}

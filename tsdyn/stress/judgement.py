@@ -273,9 +273,12 @@ def judge_scene(seed, least=None, most=None):
 def comparison(rng, case):
     """Return the comparison by which a case is judged besides the laws of its run, in a tuple, or none.
 
-    Motions with impacts at one instant don't depend continuously on their start: methods may differ.
+    Motions with impacts at one instant don't depend continuously on their start: methods may differ. Functions of
+    the user's have no image, and no place in a file.
     """
     served = (with_few_impacts, mirrored, *OF_THE_SAME) if contacts_of(case.scene.constraints) else ALL
+    if "events" in case.options:
+        served = with_few_impacts, once_more, stopped, output_times
     return (served[rng.integers(len(served))],) if rng.random() < COMPARED else ()
 
 
@@ -300,7 +303,8 @@ def judge(case, others):
     solution = run_case(case)
     if not solution.success and not solution.message.strip():
         return f"{FAULT} no message", str(solution.status)
-    found = laws.findings(solution)
+    actions = zip(solution.t_events or (), case.options.get("events", ()), strict=True)
+    found = laws.findings(solution, [(times, *event.gives) for times, event in actions if event.gives])
     if solution.success:
         found += energy(case, solution, run_case) + momenta(case, solution, run_case)
         found += [one for other in others for one in other(case, solution, run_case)]

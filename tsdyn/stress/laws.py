@@ -92,7 +92,7 @@ def resumed_is_same(scene, span, solution, after=0.0, **options):
     with TemporaryDirectory() as folder:
         path, every = f"{folder}/run.h5", OFTEN if after else SELDOM
         simulate(scene, span, progress=_Stop(path, after), store=path, checkpoint=every, **options)
-        return same_bits(solution, resume(path, scene=scene))
+        return same_bits(solution, resume(path, scene=scene, events=options.get("events")))
 
 
 def saved_is_same(solution):
@@ -116,8 +116,14 @@ def prepared_twice(scene, span, **options):
 def same_bits(one, two):
     """Whether two solutions, or states, have the same numbers, phases and impulses to the bit."""
     pairs = [(getattr(one, name), getattr(two, name)) for name in ("t", "q", "qd", "qdd")]
-    events = [[getattr(each, name, None) for name in ("phases", "impulses")] for each in (one, two)]
-    return all(np.array_equal(*pair) for pair in pairs) and events[0] == events[1]
+    events = [getattr(each, "phases", None) for each in (one, two)]
+    struck = [_numbers(getattr(each, "impulses", ())) for each in (one, two)]
+    return all(np.array_equal(*pair) for pair in pairs) and events[0] == events[1] and struck[0] == struck[1]
+
+
+def _numbers(impulses):
+    """Times, names and numbers of impulses, of contacts and of rows that have become active."""
+    return [(t, name, np.ravel(p).tolist(), np.ravel(getattr(p, "tangential", ())).tolist()) for t, name, p in impulses]
 
 
 # The law of motors: joints follow the motions that are prescribed, which rows of sines know modulo turns alone.
@@ -439,10 +445,11 @@ def unilateral(solution):
 
 
 def phases(solution):
-    """Phases follow each other: each begins where the one before it ends."""
+    """Phases follow each other: each begins where the one before it ends, and ends no sooner."""
     if solution._phases is not None:
         begin, end = np.array([each[:2] for each in solution.phases]).T
-        yield Finding("phases in a row", float(np.abs(begin[1:] - end[:-1]).max(initial=0.0)), 0.0)
+        off = np.abs(begin[1:] - end[:-1]).max(initial=0.0), (begin - end).max(initial=0.0)
+        yield Finding("phases in a row", float(max(off)), 0.0)
 
 
 def rubbing(solution):
@@ -466,8 +473,11 @@ def rubbing(solution):
         yield Finding("friction against the slip", share, limits.RUBBED, contact.name)
 
 
-def impacts(solution):
-    """What an impact changes are the momenta of its impulses, and of those of the bilateral constraints."""
+def impacts(solution, given=()):
+    """What an impact changes are the momenta of its impulses, and of those of the bilateral constraints.
+
+    given: of events whose actions give impulses: their times, the body and the impulse (3,), N s.
+    """
     contacts = [] if solution._phases is None else list(_contacts(solution.packed))
     if not contacts:
         return
@@ -475,12 +485,16 @@ def impacts(solution):
     lever = np.where(turning(system.bodies, fastest.size), 1.0 / _size(solution), 1.0)  # momenta as of positions
     rows = [row for contact, own in contacts for row in (*own, *_slips(contact, own))]
     before, after = _events(solution)
-    hit = [k for k, i in enumerate(before) if any(t == solution.t[i] for t, *_ in solution.impulses)]
+    times = {t for t, *_ in solution.impulses}.union(*(found.tolist() for found, *_ in given))
+    hit = [k for k, i in enumerate(before) if solution.t[i] in times]
     for k in np.array(hit, int)[some(len(hit), limits.IMPACTS)] if hit else ():
         i, j = before[k], after[k]
         q, t = solution.q[i], solution.t[i]
         M, Phi_q = lever[:, None] * mass_matrix(system, q), lever * constraint_arrays(system, q, solution.qd[i], t)[1]
         change = M @ (solution.qd[j] - solution.qd[i])
+        for times, body, impulse in given:
+            at = system.bodies[index_of(solution.packed, body), 0]
+            change[at : at + 3] -= (t in times) * lever[at : at + 3] * impulse
         for contact, own in contacts:
             found = [p for at, name, p in solution.impulses if (at, name) == (t, contact.name)]
             nearest = int(np.argmin([abs(gap[i]) for gap in _gaps(contact, solution)]))
@@ -582,12 +596,12 @@ def _turned(states, body, s):
 LAWS = (finite, constraints, newton_euler, dense_output, motors, unilateral, phases, rubbing, impacts)
 
 
-def findings(solution, laws=LAWS):
-    """Return what every law found."""
+def findings(solution, given=()):
+    """Return what every law found; given: as of `impacts`."""
     if not len(solution.t):
         return []
-    first = list(finite(solution))
-    return first or [found for law in laws if law is not finite for found in law(solution)]
+    first, rest = list(finite(solution)), [law for law in LAWS if law not in (finite, impacts)]
+    return first or [found for law in rest for found in law(solution)] + [*impacts(solution, given)]
 
 
 def energy_left(solution):

@@ -24,7 +24,7 @@ class Draw:
     """A scene that is drawn, its random numbers, and its units in terms of SI."""
 
     def __init__(self, rng):
-        self.rng, self.origin, self.spread, self.assembled = rng, np.zeros(3), 0.0, False
+        self.rng, self.origin, self.spread, self.assembled, self.options = rng, np.zeros(3), 0.0, False, {}
         other = rng.random() < IN_UNITS
         self.length, self.mass, self.time = (
             10.0 ** rng.uniform(-decades, decades) if other else 1.0 for decades in DECADES.values()
@@ -346,9 +346,9 @@ FIRST = {
 }  # fmt: skip
 LATER = {each.__name__: each for each in (coupled, rolling)}
 LATER_CONTACTS = contact_scenes.LATER_CONTACTS | {"limited": limited}
-CONTACTS = contact_scenes.CONTACTS | LATER_CONTACTS
+CONTACTS = contact_scenes.CONTACTS | LATER_CONTACTS | contact_scenes.ACTIONS
 KINDS = FIRST | LATER | CONTACTS
-KINDS_OF_SEEDS = {0: LATER, 10: LATER, 4: contact_scenes.CONTACTS, 14: LATER_CONTACTS}
+KINDS_OF_SEEDS = {0: LATER, 10: LATER, 4: contact_scenes.CONTACTS, 14: LATER_CONTACTS, 16: contact_scenes.ACTIONS}
 
 
 def generate(seed, least=None, most=None):
@@ -373,9 +373,9 @@ def drawn(rng, least=None, most=None, kinds=KINDS):
     if name not in CONTACTS:
         moving(d)
     method = str(rng.choice(METHODS))
-    options = {} if method == "default" else {"integrator": method}
+    options = d.options if method == "default" else d.options | {"integrator": method}
     if method == "nystrom4":
-        options = {"integrator": d.fixed_step()}
+        options = d.options | {"integrator": d.fixed_step()}
     elif method != "taylor":
         options |= {"rtol": 1e-8, "atol": 1e-8 * min(d.length, 1.0)}
     if rng.random() < 0.1 and len(d.scene.bodies) < 15 and method != "taylor" and d.is_si:

@@ -138,6 +138,7 @@ def test_code_that_no_way_compiles_is_an_error_of_the_code(monkeypatch):
     assert compilers.current() is backend
 
 
+@pytest.mark.slow
 def test_stock_is_asked_for_without_a_warning(tmp_path):
     environment = {"TSDYN_JIT": "stock", "TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}
     for misses in (1, 0):

@@ -218,7 +218,7 @@ def test_both_ways_give_the_same_bits():
     assert "CompilerWarning" not in errors
 
 
-@pytest.mark.slow_but("backend")
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["lanes", "simd", "resident", "backend", "stock"])
 def test_an_edit_of_code_generation_names_other_kernels(package, file):
     """Types and their lowering are named by no function."""

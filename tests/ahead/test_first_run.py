@@ -13,6 +13,7 @@ from tsdyn import ahead
 from tsdyn.configuration.initial_conditions import evaluate_start
 from tsdyn.jit.compiled import _types
 from tsdyn.runs.run_memory import advance_run
+from tsdyn.taylor.step_parts import pass_singular
 from tsdyn.taylor.stepper import advance_series
 
 ROOT = Path(__file__).parents[2]
@@ -134,16 +135,27 @@ print(cache.statistics["misses"], end.tobytes().hex())
     assert out == f"0 {expected.tobytes().hex()}"
 
 
+def fall(count):
+    """Balls that fall on a plane."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    for i in range(count):
+        ball = scene.add_point_mass(mass=1.0, position=(i, 0, 0.2 + 0.1 * i))
+        scene.add(ts.constraints.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True))
+    return ts.simulate(scene, (0, 0.5))
+
+
+def test_what_events_need_of_the_method_is_asked_for_at_once(monkeypatch):
+    asked = []
+    monkeypatch.setattr(ahead, "_known", {})
+    monkeypatch.setattr(ahead, "compile_ahead", lambda kernels: asked.append({*kernels}))
+    fall(1)
+    assert {advance_series, pass_singular} <= asked[0]
+    added = set().union(*asked[1:]) - asked[0]
+    assert added == {*ahead.of_constraint(ts.constraints.PlaneContact, False)}
+
+
 def test_kernels_of_phases_are_looked_up_once(monkeypatch):
     """Sets of closed contacts add rows of classes that are known: another scene's phases look for nothing."""
-
-    def fall(count):
-        scene = ts.Scene(gravity=(0, 0, -10))
-        for i in range(count):
-            ball = scene.add_point_mass(mass=1.0, position=(i, 0, 0.2 + 0.1 * i))
-            scene.add(ts.constraints.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True))
-        return ts.simulate(scene, (0, 0.5))
-
     fall(1)
     monkeypatch.setattr(ahead, "kernels_of", lambda *given: pytest.fail("looked up again"))
     assert len(fall(3).phases) == 4

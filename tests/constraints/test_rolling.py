@@ -306,7 +306,7 @@ def test_a_disc_that_starts_slipping_or_off_the_plane_is_named():
     assert ts.simulate(scene, (0, 1)).success
 
 
-@pytest.mark.slow_for("sliding")
+@pytest.mark.slow
 @pytest.mark.parametrize("slip", [False, True], ids=["rolling", "sliding"])
 def test_a_disc_that_lies_flat_is_named(slip):
     scene = ts.Scene()

@@ -64,6 +64,7 @@ def test_there_and_back(which, suffix, tmp_path):
         assert twice.case(1).q.tobytes() == found.case(1).q.tobytes()
 
 
+@pytest.mark.slow
 def test_failures_assembled_starts_and_options_are_kept(tmp_path):
     scene = tolerance_analysis.build()
     lengths, masses = tolerance_analysis.draw(2)

@@ -54,6 +54,7 @@ def on_rail(function, **options):
 # Against what is known
 
 
+@pytest.mark.slow_for("called")
 @pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
 def test_poles_of_the_closed_loop_are_those_of_A_and_B_K(function):
     A, B = cart(angle=0.0).linearise(inputs=["rail"]).state_space()[:2]

@@ -108,7 +108,7 @@ def net(count=3):
     return scene
 
 
-@pytest.mark.slow_but("free", "net")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "end"),
     [

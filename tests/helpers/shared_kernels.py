@@ -1,7 +1,7 @@
 """The kernels that most tests need: explicit methods and Taylor, every form, all constraints and most forces.
 
-What is rare isn't among them, and tests of it are `slow`: implicit methods, series of a thousand bodies, friction of
-joints.
+What is rare isn't among them, and most tests of it are `slow`: implicit methods, lanes, series of a thousand bodies,
+friction of joints.
 """
 
 import tsdyn as ts

@@ -78,6 +78,7 @@ def test_orders_and_what_chooses_them():
         I.Radau(order=7)
 
 
+@pytest.mark.slow_for("null-space")
 @pytest.mark.parametrize("form", ["null-space", "maggi-kane"])
 def test_other_forms_are_refused(form):
     scene = ts.Scene()

@@ -138,6 +138,7 @@ def test_code_that_no_way_compiles_is_an_error_of_the_code(monkeypatch):
     assert compilers.current() is backend
 
 
+@pytest.mark.slow
 def test_stock_is_asked_for_without_a_warning(tmp_path):
     environment = {"TSDYN_JIT": "stock", "TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}
     for misses in (1, 0):
@@ -217,7 +218,7 @@ def test_both_ways_give_the_same_bits():
     assert "CompilerWarning" not in errors
 
 
-@pytest.mark.slow_but("backend")
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["lanes", "simd", "resident", "backend", "stock"])
 def test_an_edit_of_code_generation_names_other_kernels(package, file):
     """Types and their lowering are named by no function."""

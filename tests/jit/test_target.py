@@ -45,6 +45,7 @@ def test_a_target_needs_its_instructions(monkeypatch, lacks, found):
     assert target.available.__wrapped__() == found
 
 
+@pytest.mark.slow
 @own
 @portable
 def test_a_kernel_of_one_target_is_not_used_for_another(tmp_path):

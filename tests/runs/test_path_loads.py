@@ -171,7 +171,7 @@ def smooth(t, state, *, k=1.0):
     return (-k * np.tanh(3.0 * state[0]) - 0.1 * state[7], 0.3 * np.exp(-state[0]), -k * state[2] ** 3)
 
 
-@pytest.mark.slow_but("*dop853", "*rk45")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in STAGES if name != "default"])
 @pytest.mark.parametrize("tol", [1e-4, 1e-8])
 def test_smooth_loads_reject_no_step(name, tol, monkeypatch):

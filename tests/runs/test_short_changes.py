@@ -88,6 +88,7 @@ def narrow(t, state, *, at=50.0, width=0.1, sway=0.0, rate=1.0):
     return (0.0, 0.0, sway * np.cos(rate * t) + max(0.0, 1.0 - abs(t - at) / width))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_triangles_anywhere_and_on_a_sway(seed):
     """The impulse of a triangle is its width, that of the sway sway sin(rate t) / rate."""

@@ -323,7 +323,7 @@ def with_code():
     return scene
 
 
-@pytest.mark.slow_for("zarr")
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["h5", "zarr"])
 def test_what_a_file_names_only_is_not_needed_to_look_at_it(suffix, tmp_path):
     scene = with_code()

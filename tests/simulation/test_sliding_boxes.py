@@ -123,7 +123,7 @@ def test_friction_is_against_a_slip_that_turns_until_it_ends():
     np.testing.assert_allclose(*loads, atol=1e-3)
 
 
-@pytest.mark.slow_for("0.23*", "0.3-*")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mu", "size", "v", "spin", "angle"),
     [

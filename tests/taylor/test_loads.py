@@ -97,6 +97,7 @@ def test_motions_by_series_are_those_by_stages(make):
     assert ts.simulate(scene, (0, 0.1)).method.startswith("Taylor")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [F.JointTorque, F.JointForce])
 def test_control_laws_of_joints(make):
     scene = ts.Scene(gravity=(0, 0, -10))

@@ -162,7 +162,8 @@ class Run:
         self._in_phases = options.acts or self._first is not scene
         self._compiled = set()  # with outputs between steps, or not
         self._last = self._seen = None  # the last `_Last`, and state
-        self._prepare_kernels(options.dense_output or options.events is not None)
+        # phases end at events
+        self._prepare_kernels(self._in_phases or options.dense_output or options.events is not None)
         self._prepared = kept = prepared(self._first)
         self._packed, self._start = scene.packed, scene._initial()
         self.method = method = first_method(options, kept)

@@ -33,9 +33,6 @@ from .tolerances import (
     WITHIN_BOUND,
 )
 
-# Of the largest reaction: what reactions that are shared are right to, where some are zero
-PATH_ERROR = 1e-8
-
 
 def rows_of(inertia, which):
     """Rows (3 k, n) of the gaps `which` and of their slips."""
@@ -507,17 +504,13 @@ def _held(inertia, closed, grips, b, small):
     by = least_squares(A, np.eye(len(A)), RANK_TOL**2)
     p, by = -by @ a, by[:k]
     pushes, sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
-    braced = np.zeros(k, bool)
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
         loads = inertia.free(rows_of(inertia, sticks).T).T
-        before = pushes.copy()
         pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
-        braced = pushes != before
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
-    rounding = np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
-    return pushes, np.where(braced, np.maximum(rounding, PATH_ERROR * largest), rounding)
+    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
 
 
 def _holding(inertia, closed, grips, b):

@@ -10,6 +10,7 @@ joints tie slips to rates of gaps: coefficients of restitution are lowered toget
 
 from __future__ import annotations
 
+from contextlib import suppress
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -224,20 +225,18 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
             continue
         if all(found[1].grips.get(i, ()) is None for i in which):
             return found
-    found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP * limits), resting)
+    least = slow_slips(inertia, qd, slow, LEAST_SLIP * limits)
+    found = ended(least, resting)
     gains, slips = found[1].gains, inertia.slips(qd)
-    slower = [
-        i for i in slow_slips(inertia, qd, turned, SLOWEST_SLIP * limits) if i in gains and gains[i] @ slips[i] < 0
-    ]
-    pairs = {_pair(inertia.gaps, i) for i in slower}
+    slowest = slow_slips(inertia, qd, turned, SLOWEST_SLIP * limits)
+    pairs = {_pair(inertia.gaps, i) for i in slowest if i in gains and gains[i] @ slips[i] < 0.0}
     which = [i for i in slow_slips(inertia, qd, slow, SLOWEST_SLIP * limits) if _pair(inertia.gaps, i) in pairs]
-    between = {} if which else _between(inertia, resting, *found, fired, turned)
-    try:
-        return ended(which or list(between), ways=between) if which or between else found
-    except NoSolution:
-        if which:
-            raise
-        return found
+    if which:
+        return ended(which)
+    ways = _between(inertia, resting, *found, fired, turned)
+    with suppress(NoSolution):
+        return ended([*least, *ways], ways=ways) if ways else found
+    return found
 
 
 def _between(inertia, resting, qd, state, fired, turned):

@@ -465,6 +465,26 @@ def test_a_block_on_a_belt():
     assert solution.sticking("grip")[-1]
 
 
+@pytest.mark.parametrize("speed", [1e-7, 1e-8])
+def test_a_slow_slip_that_one_direction_forces_turns_to_where_friction_leaves_it(speed):
+    """A belt drives the slip across a guide; along it the friction mu N sin(phi) carries the load: v = speed tan(phi).
+
+    Friction turns such a slip within speed / (mu g), some 1e-9 s.
+    """
+    scene, mu, share = ts.Scene(gravity=(0, 0, -G)), 0.3, 0.6
+    belt = scene.add_body(1.0, (1, 1, 1), velocity=(0, speed, 0), name="belt")
+    slide = scene.add(C.Translational.at(scene.ground, belt, point=(0, 0, 0), axis=(0, 1, 0)))
+    scene.add(C.TranslationMotor.of(slide, displacement=speed * ts.motions.time))
+    block = scene.add_point_mass(1.0, name="block")
+    scene.add(C.PlaneContact(block, scene.ground, normal_b=(0, 1, 0)))
+    scene.add(C.PlaneContact(block, belt, **FLOOR, kinetic=mu, name="grip"))
+    scene.add(ts.forces.PointForce(block, force=(share * mu * G, 0, 0)))
+    solution = ts.simulate(scene, (0, 1e-3), max_steps=300).raise_if_failed()
+    assert abs(solution.velocity(block)[-1, 0] / speed - 0.75) < 0.05
+    friction = solution.reaction("grip")[0][-1]
+    np.testing.assert_allclose(friction[:2], mu * G * np.array([-share, np.sqrt(1 - share**2)]), rtol=1e-2)
+
+
 def test_painleves_rod_ends_with_an_account():
     """A rod that slides with its upper end ahead and mu > 4/3 has no reaction: 1 + 3 cos (cos - mu sin) < 0."""
     scene, a = ts.Scene(gravity=(0, 0, -G)), 1.0

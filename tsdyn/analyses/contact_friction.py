@@ -10,6 +10,8 @@ joints tie slips to rates of gaps: coefficients of restitution are lowered toget
 
 from __future__ import annotations
 
+from contextlib import suppress
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -19,10 +21,19 @@ from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
-from .tolerances import AHEAD, EVENT_ERROR, FAR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
-
-# Of the largest reaction: what reactions that are shared are right to, where some are zero
-PATH_ERROR = 1e-8
+from .tolerances import (
+    AHEAD,
+    EVENT_ERROR,
+    FAR,
+    LEAST_SHARE,
+    LEAST_SLIP,
+    LEVEL,
+    NEAR_WAY,
+    PULLS,
+    SECANTS,
+    SLOWEST_SLIP,
+    WITHIN_BOUND,
+)
 
 
 def rows_of(inertia, which):
@@ -88,9 +99,11 @@ class Cones:
         Accelerations of all gaps where all are open, and the sizes of their terms.
     slow : ndarray (count,)
         Of `slow_speeds`.
+
+    Of some that slide the friction has directions `ways` (2,) in place of those of their slips.
     """
 
-    def __init__(self, inertia, resting, qd):
+    def __init__(self, inertia, resting, qd, ways=MappingProxyType({})):
         gaps, slips = inertia.gaps, inertia.slips(qd)[resting]
         self.open, self.terms = inertia.accelerations(qd)
         self.rounding = SUM_ROUNDING * self.terms.max(initial=0.0)
@@ -99,6 +112,8 @@ class Cones:
         self.slides = speeds > LEAST_SLIP * self.slow[resting]
         self.d = np.full(slips.shape, np.nan)
         self.d[self.slides] = slips[self.slides] / speeds[self.slides, None]
+        for i, d in ways.items():
+            self.d[resting.index(i)] = d
         self.rough, self.kinetic, self.static = (x[resting] for x in (gaps.rough, gaps.kinetic, gaps.static))
 
     def solve(self, G, b, bounds=()):
@@ -181,6 +196,7 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     the contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below a part of that,
     SLOWEST_SLIP, it is ended, too, where it slows down with its friction against it, to slide off in another direction
     at once: with all of its two bodies, since the slip of one point alone is no motion that begins. Energy never grows.
+    One that turns to and fro takes the direction between, see `_between`.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
@@ -192,13 +208,13 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rough[i]], limits)
     closed = [i for i in inertia.held if i in resting]
 
-    def ended(which, closed=closed):
-        found, work = halted(inertia, qd, closed, which)
+    def ended(which, closed=closed, ways=MappingProxyType({})):
+        found, work = halted(inertia, qd, closed, which, ways)
         if found is not qd:
             rates, before = inertia.rates(found), inertia.rates(qd)
             more = [i for i in opening if rates[i] <= 0.5 * before[i]]
             if rates[resting].any() or more:  # others have closed at once
-                found, work = halted(inertia, qd, [*resting, *more], which)
+                found, work = halted(inertia, qd, [*resting, *more], which, ways)
             if work > NEGLIGIBLE * _energy(inertia, qd):  # by the friction of others that slide
                 found = qd
         return found, solve_rough_contacts(inertia, resting, found, fired)
@@ -210,11 +226,57 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
             continue
         if all(found[1].grips.get(i, ()) is None for i in which):
             return found
-    found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP * limits), resting)
-    turned = [i for i in slow_slips(inertia, qd, turned, SLOWEST_SLIP * limits) if found[1].gains.get(i, 0.0) < 0.0]
-    pairs = {_pair(inertia.gaps, i) for i in turned}
+    least = slow_slips(inertia, qd, slow, LEAST_SLIP * limits)
+    found = ended(least, resting)
+    gains, slips = found[1].gains, inertia.slips(qd)
+    slowest = slow_slips(inertia, qd, turned, SLOWEST_SLIP * limits)
+    pairs = {_pair(inertia.gaps, i) for i in slowest if i in gains and gains[i] @ slips[i] < 0.0}
     which = [i for i in slow_slips(inertia, qd, slow, SLOWEST_SLIP * limits) if _pair(inertia.gaps, i) in pairs]
-    return ended(which) if which else found
+    if which:
+        return ended(which)
+    ways = _between(inertia, resting, *found, fired, turned)
+    with suppress(NoSolution):
+        return ended([*least, *ways], ways=ways) if ways else found
+    return found
+
+
+def _between(inertia, resting, qd, state, fired, turned):
+    """Directions (2,) of slow slips that turn to and fro: in which they have no acceleration across.
+
+    Slips turn the sooner the slower they are. So does friction, till it leaves the slip its direction: between that of
+    the phase before, in which the slip has turned, and the present one, in which it would turn back.
+    """
+    ends = {}  # of each slip: directions, and by how much it turns with these
+    for i in turned:
+        way = inertia.across(i, inertia.slots[inertia.gaps.slots[i] :][:3])
+        if i in state.gains and way.any():
+            d, way = inertia.across(i, state.grips[i]), way / np.hypot(*way)
+            ends[i] = [[way, np.nan], [d, _cross(d, state.gains[i])]]
+    if not ends:
+        return {}
+    try:
+        found = {i: way for i, ((way, _), _) in ends.items()}
+        for _ in range(SECANTS + 1):
+            state = _solve(inertia, resting, qd, fired, ways=found)[0]
+            for i, (first, last) in list(ends.items()):
+                turn, start = _cross(found[i], state.gains.get(i, 0.0 * found[i])), np.isnan(first[1])
+                (first if start or turn * first[1] > 0.0 else last)[:] = found[i], turn
+                (c, x), (d, y) = first, last
+                if start and not (x * y < 0.0 and x * _cross(c, d) > 0.0 and d @ c > NEAR_WAY):
+                    del ends[i], found[i]
+                else:
+                    d = abs(x) * d + abs(y) * c
+                    found[i] = d / np.hypot(*d)
+            if not found:
+                break
+    except NoSolution:
+        return {}
+    return found
+
+
+def _cross(a, b):
+    """a x b of a (2,) and b (2, ...), along the normal."""
+    return a[0] * b[1] - a[1] * b[0]
 
 
 def _energy(inertia, qd):
@@ -228,13 +290,14 @@ def _pair(gaps, i):
     return frozenset((id(part.a), id(part.b)))
 
 
-def _solve(inertia, resting, qd, fired, by_rows=False):
+def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})):
     """As `solve_rough_contacts`, with the normal loads shared among all contacts; and whether a closed one pulls.
 
     by_rows: closed contacts are chosen by what holds their rows, instead of by the same accelerations.
+    ways: of `Cones`.
     """
     gaps, resting = inertia.gaps, list(resting)
-    cones = Cones(inertia, resting, qd)
+    cones = Cones(inertia, resting, qd, ways)
     response = inertia.free(cones.rows.T)
     G, c, terms = product(cones.rows, response), cones.open, cones.terms
     b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
@@ -277,7 +340,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
     pushes, rounding = _held(inertia, closed, grips, alone, small + carried)
     slack = slack_of(inertia, closed, pushes, small)
-    gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
+    gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
     rows = _independent(inertia, closed, grips)
     found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains, begun, cones.slow)
     return found, bool((pushes < -rounding).any())
@@ -380,8 +443,10 @@ def _basis(inertia, which, columns, load, fired):
     return sorted(closed), sorted(idle)
 
 
-def halted(inertia, qd, resting, which):
+def halted(inertia, qd, resting, which, ways=MappingProxyType({})):
     """Velocities (n,) with the slips ended of the gaps `which`, while the gaps `resting` keep their rates; and work, J.
+
+    Of slips with `ways`, directions (2,), the part across these.
 
     What sticks goes on to, and what goes on sliding changes its friction with its load: as in the course of time. The
     work is that of the friction: what drives bodies does some, too, where they come to rest on one that moves.
@@ -391,8 +456,9 @@ def halted(inertia, qd, resting, which):
     frictional, slips = [i for i in resting if inertia.gaps.rough[i]], inertia.slips(qd)
     moving = [i for i in frictional if i not in which and slips[i].any()]
     loads = _loads(inertia, resting, {i: slips[i] / np.hypot(*slips[i]) for i in moving})
-    held = [i for i in frictional if i not in moving]
-    tangents = inertia.tangents[held].reshape(2 * len(held), -1)
+    across = {i: _cross(d, inertia.tangents[i])[None] for i, d in ways.items()}
+    tangents = [across.get(i, inertia.tangents[i]) for i in frictional if i not in moving]
+    tangents = np.concatenate([loads[:0], *tangents])
     response = inertia.free(np.concatenate([loads, tangents]).T)
     left = np.concatenate([np.zeros(len(resting)), tangents @ qd])
     G = product(np.concatenate([inertia.J[resting], tangents]), response)
@@ -441,17 +507,13 @@ def _held(inertia, closed, grips, b, small):
     by = least_squares(A, np.eye(len(A)), RANK_TOL**2)
     p, by = -by @ a, by[:k]
     pushes, sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
-    braced = np.zeros(k, bool)
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
         loads = inertia.free(rows_of(inertia, sticks).T).T * inertia.gaps.levers(inertia.q)
-        before = pushes.copy()
         pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
-        braced = pushes != before
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
-    rounding = np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
-    return pushes, np.where(braced, np.maximum(rounding, PATH_ERROR * largest), rounding)
+    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
 
 
 def _holding(inertia, closed, grips, b):

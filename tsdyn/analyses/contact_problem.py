@@ -379,8 +379,8 @@ class ContactState(NamedTuple):
     grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
     rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
     slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
-    gains: dict = MappingProxyType({})  # of those that slide: what their slips gain, m/s^2
-    begun: dict = MappingProxyType({})  # the same of those that begin to slide, above rounding
+    gains: dict = MappingProxyType({})  # of those that slide: accelerations (2,) of their slips, m/s^2
+    begun: dict = MappingProxyType({})  # the size of these, of those that begin to slide, above rounding
     slow: np.ndarray | None = None  # (count,) slips, m/s, below which friction keeps a direction
 
 

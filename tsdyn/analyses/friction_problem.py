@@ -22,8 +22,7 @@ from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..jit.kernels import twin
 from ..maths.complementarity import OPEN, STICKS
-from ..maths.dense_linalg import range_and_null_space
-from ..maths.dense_solve import least_squares, product
+from ..maths.dense_solve import least_squares, null_space, product
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
 from ..model.packed import reach_of
@@ -292,7 +291,7 @@ def gradients(packed, t, q, memory):
 def free_motions(packed, t, q, memory, rows):
     """Velocities (rows, motions) of some rows of all motions that the others leave free."""
     Phi_q = gradients(packed, t, q, memory)
-    return Phi_q[rows] @ _null_space(np.delete(Phi_q, rows, axis=0))
+    return Phi_q[rows] @ null_space(np.delete(Phi_q, rows, axis=0), RANK_TOL)
 
 
 def _remembering(system, memory):
@@ -315,7 +314,7 @@ def immobile(packed, t, q, qd, memory):
     Phi_q = Phi_q[steady]
     while columns.size:
         mine = ~np.delete(Phi_q, columns, axis=1).any(axis=1)
-        moved = _null_space(Phi_q[np.ix_(mine, columns)])
+        moved = null_space(Phi_q[np.ix_(mine, columns)], RANK_TOL)
         moves = np.isin(np.arange(q.size), columns[np.abs(moved).max(axis=1, initial=0.0) > RANK_TOL])
         if not moves.any():
             break
@@ -326,10 +325,6 @@ def immobile(packed, t, q, qd, memory):
 
 def _columns(spans):
     return np.concatenate([np.zeros(0, int), *(np.arange(at, at + length) for at, length in spans)])
-
-
-def _null_space(rows):
-    return range_and_null_space(rows)[1] if len(rows) else np.eye(rows.shape[1])
 
 
 class FrictionAtRest(NamedTuple):

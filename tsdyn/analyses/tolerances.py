@@ -134,6 +134,8 @@ PULLS = 1e-6
 AHEAD = 3e-7
 # Of that slip: one below which a slip that turns has come to rest, and the least: iterations of stages leave 1e-13 m/s.
 SLOWEST_SLIP, LEAST_SLIP = 1e-2, 1e-5
+# Cosine of the turn of a slow slip from which on it may take the direction between, 8 degrees at an event; steps to it.
+NEAR_WAY, SECANTS = 0.98, 3
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
 # Square of the sine of the angle between a slip of a contact that sticks and the rows that hold, above which it is

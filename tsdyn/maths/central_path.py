@@ -17,9 +17,10 @@ from .dense_linalg import copy, lu, lu_solve
 from .dense_solve import least_squares
 from .tolerances import RANK_TOL
 
-# The first weight, its factor and their number; steps at most at each, the gain that ends them, the shortest share of
-# a step; margin that is deep, as a share of the largest reaction
-FIRST, FACTOR, WEIGHTS = 1e1, 1e1, 7
+# The first weight, its factor and their number, by which points are right to 1e-11 of the largest reaction, also where
+# some are zero; steps at most at each, the gain that ends them, the shortest share of a step; margin that is deep, as a
+# share of the largest reaction
+FIRST, FACTOR, WEIGHTS = 1e1, 1e1, 9
 STEPS, SETTLED, SHORTEST, MARGIN = 30, 1e-9, 1e-9, 0.1
 
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.resuming import Stop
 from tests.helpers.tolerances import TIGHT
+from tsdyn.runs import driver
 
 C, F = ts.constraints, ts.forces
 G = 9.81
@@ -88,3 +90,63 @@ def test_a_load_that_jumps_lifts_a_body(friction):
     land = 1.5 + 0.5 * (1.0 + np.sqrt(2.0))
     assert [start for start, *_ in solution.phases] == [0.0, 1.0, pytest.approx(land, abs=TIGHT)]
     assert solution.at(1.25).position(body)[2] == pytest.approx(0.5 * G * 0.25**2, abs=TIGHT)
+
+
+def pushed(load, way, **law):
+    """A point mass of 1 kg on a floor, under a load that jumps at 0.1 s between two values along `way`."""
+    (before, after), scene = load[1:], ts.Scene()
+    body = scene.add_point_mass(1.0, name="body")
+    scene.add(C.PlaneContact(body, scene.ground, normal_b=(0, 0, 1), unilateral=True, name="floor", **law))
+    if load[0] == "table":
+        scene.add(F.PointForce(body, force=table([0.0, 0.1], [before, after], way), name="load"))
+    else:
+        law = lambda t, state: before if t < 0.1 else after  # noqa: E731
+        scene.add(F.Control(law, [F.PointForce(body, force=way)], period=0.05, name="load"))
+    return scene
+
+
+def sides(array, solution):
+    """What outputs say on both sides of 0.1 s."""
+    return array[np.isclose(solution.t, 0.1, rtol=0.0, atol=1e-12)]
+
+
+@pytest.mark.parametrize("kind", ["sampled", "table"])
+@pytest.mark.parametrize("method", ["taylor", "dop853", "radau"])
+def test_outputs_on_both_sides_of_a_jump_that_opens_a_contact(kind, method):
+    """5 N down, then 30 N up: the floor exerts m g + 5 N up to the jump, in outputs and in between."""
+    scene = pushed((kind, -5.0, 30.0), (0, 0, 1))
+    solution = ts.simulate(scene, (0, 0.2), integrator=method, dense_output=True)
+    forces = sides(solution.reaction("floor")[0][:, 2], solution)
+    np.testing.assert_allclose(forces, [5.0 + G, 0.0], atol=TIGHT)
+    np.testing.assert_allclose(sides(solution.qdd[:, 2], solution), [0.0, 30.0 - G], atol=TIGHT)
+    between = solution.at([np.nextafter(0.1, 0.0), 0.1]).reaction("floor")[0][:, 2]
+    np.testing.assert_allclose(between, [5.0 + G, 0.0], atol=TIGHT)
+
+
+@pytest.mark.parametrize("kind", ["sampled", "table"])
+def test_outputs_on_both_sides_of_a_jump_that_ends_sticking(kind):
+    """1 N along the floor, then 9 N, of 9.81 N: friction of 1 N, then 0.3 of the weight."""
+    scene = pushed((kind, 1.0, 9.0), (1, 0, 0), kinetic=0.3)
+    solution = ts.simulate(scene, (0, 0.2))
+    np.testing.assert_allclose(sides(solution.reaction("floor")[0][:, 0], solution), [-1.0, -0.3 * G], atol=TIGHT)
+    np.testing.assert_allclose(sides(solution.friction_demand("floor"), solution), [1.0 / G, 0.3], atol=TIGHT)
+    np.testing.assert_allclose(sides(solution.qdd[:, 0], solution), [0.0, 9.0 - 0.3 * G], atol=TIGHT)
+    assert sides(solution.sticking("floor"), solution).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("kind", ["sampled", "table"])
+def test_both_sides_of_a_jump_in_a_store(kind, tmp_path, monkeypatch):
+    """Of a run that was stopped at steps up to the jump, and goes on."""
+    scene, runs = pushed((kind, -5.0, 30.0), (0, 0, 1), kinetic=0.3), []
+    monkeypatch.setattr(driver, "FIRST_SLICE", 1)
+    for stop in (2, 3, 4):
+        path = tmp_path / f"{stop}.h5"
+        given = {"integrator": "dop853", "store": path, "checkpoint": 0.0}
+        assert ts.simulate(scene, (0, 0.2), progress=Stop(stop), **given).status is ts.Status.INTERRUPTED
+        runs += [ts.resume(path, scene), ts.load(path, scene)]
+    for solution in runs:
+        assert solution.success
+        forces = sides(solution.reaction("floor")[0][:, 2], solution)
+        np.testing.assert_allclose(forces, [5.0 + G, 0.0], atol=TIGHT)
+        load = solution.reaction("load", "body")[0][:, 2] if kind == "table" else solution.actuation("load")[:, 0]
+        np.testing.assert_allclose(sides(load, solution), [-5.0, 30.0], atol=TIGHT)

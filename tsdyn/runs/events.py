@@ -535,14 +535,20 @@ class Watch:
         return None
 
     def _cross_stop(self, run, log):
-        """Take the values of groups with the loads after a stop; the `Occurrence` that ends the run there, or None."""
-        self.state, self.memory = run.now.copy(), run.remembered.copy()
+        """Take the values of groups with the loads after a stop; the `Occurrence` that ends the run there, or None.
+
+        The output of a run that ends has the loads before: the next one begins with those after.
+        """
+        before, self.state, self.memory = (self.state, self.memory), run.now.copy(), run.remembered.copy()
         self._note_start()
         found = None
         for group in self._groups:
             for i in group.cross(self._at_start(group)):
                 found = Occurrence(self.t, i, self.state)
                 self.list[i].append(found)
+        row = log.out[run.numbers.rows - 1]
+        if found is not None and run.numbers.rows > 0 and row[0] == self.t:
+            row[1:] = np.concatenate([each.ravel() for each in before])
         return found
 
     def _search_group(self, group, step):

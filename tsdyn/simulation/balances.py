@@ -33,7 +33,9 @@ def by_phase(solution, ask, whole=False):
     whole: as of `Phases.parts`, to ask about a constraint.
     """
     phases = getattr(solution, "_phases", None)
-    return ask(solution) if phases is None or not phases.varies else gathered(solution, ask, whole)
+    if phases is None:
+        return ask(solution)
+    return gathered(solution, ask, whole) if phases.varies else ask(solution._before_jumps)
 
 
 def gathered(solution, ask, whole=False):

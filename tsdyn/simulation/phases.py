@@ -191,6 +191,11 @@ class Phases:
         same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
         return np.maximum(self.at(t) - same, 0)
 
+    def times_within(self, numbers, t):
+        """Times t (k,), but just before the ends of the phases of these numbers (k,), unless these last no time."""
+        ends = (numbers < self.at(t)) & (np.array(self.starts)[numbers] < t)
+        return np.where(ends, np.nextafter(t, -np.inf), t)
+
     def multipliers(self, numbers, m, *arrays):
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
         out = np.zeros((len(numbers), m))
@@ -297,7 +302,7 @@ class Phases:
         if not self.packed:
             raise StorageError("phases differ in forces or parameters, and the file has no scene: pass scene=.")
         for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
-            part = solution._picked(mine)
+            part = solution._before_jumps._picked(mine)
             packed = self._gaps[kind].packed if whole else self.packed[kind]
             part.packed, part.system, part.handles, part._phases = packed, packed.system, handles_of(packed), None
             if whole:

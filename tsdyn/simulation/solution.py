@@ -422,7 +422,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     @cached_property
     def _memory(self):
         """Memory of forces and normal loads of joint friction, (k, ...)."""
-        motion = self.t, self.q, self.qd, self.qdd, self._remembers
+        own = self._before_jumps
+        motion = own.t, own.q, own.qd, own.qdd, own._remembers
         return self._with_normal_loads(*motion, self._phase_of_rows)
 
     def _with_normal_loads(self, t, q, qd, qdd, memory, numbers=None):
@@ -435,7 +436,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     @cached_property
     def multipliers(self) -> Floats:
         """Multipliers (k, m), computed on first access."""
-        return self._multipliers_at(self.t, self.q, self.qd, self.qdd, self._memory, self._phase_of_rows)
+        own = self._before_jumps
+        return self._multipliers_at(own.t, own.q, own.qd, own.qdd, own._memory, self._phase_of_rows)
 
     def _multipliers_at(self, t, q, qd, qdd, memory, numbers=None):
         """Multipliers (k, m) at times of the run; with contacts in their phases, by number or by time."""
@@ -446,7 +448,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
 
     def _losses(self):
         """Power (k, contacts), W, that contacts with friction dissipate."""
-        return self._losses_at(self.t, self.q, self.qd, self.qdd, self._memory, self._phase_of_rows)
+        own = self._before_jumps
+        return self._losses_at(own.t, own.q, own.qd, own.qdd, own._memory, self._phase_of_rows)
 
     def _losses_at(self, t, q, qd, qdd, memory, numbers=None):
         """The same at times of the run, by number or by time of their phases."""

@@ -204,6 +204,21 @@ class RunOutputs:
         t = self.t if self._stored is None else self._stored.read(_COLUMNS["t"], slice(None))
         return self._phases.of_outputs(t)[self._slice]
 
+    @cached_property
+    def _shifted(self):
+        """As `_before_jumps`; None where no output ends a phase."""
+        times = None if self._phases is None else self._phases.times_within(self._phase_of_rows, self.t)
+        if times is None or (times == self.t).all():
+            return None
+        other = self._picked(slice(None))
+        other.t, other._shifted = times, None
+        return other
+
+    @property
+    def _before_jumps(self):
+        """The same with times just before those at which phases end: loads that jump there have their values before."""
+        return self if self._shifted is None else self._shifted
+
     def _length(self):
         """How many outputs there are; of a store without reading them."""
         return self.t.size if self._stored is None else len(range(self._stored.count)[self._slice])

@@ -296,7 +296,7 @@ def hybrid(d, n):
     arm = d.body(np.array((0.5, 2.0, 0.5)), rigid=True)
     hinge = d.scene.add(joints.Revolute.at(d.scene.ground, arm, point=d.place((0.0, 2.0, 0.5)), axis=(0.0, 1.0, 0.0)))
     d.scene.add(joints.Stop(hinge, -d.rng.uniform(0.0, 0.4), d.rng.uniform(0.1, 0.6), **_law(d, e)))
-    size, gain = 0.3 * arm.mass * 9.81 * L**2 / T**2, d.rng.uniform(0.0, 0.05)  # less than the weight's
+    size, gain = arm.mass * 9.81 * L**2 / T**2, d.rng.uniform(0.0, 0.05)
 
     def law(t, state):
         return size * (np.sin(20.0 * t / T) - gain * T * state.angle_rate(hinge))

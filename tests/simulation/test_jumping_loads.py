@@ -150,3 +150,24 @@ def test_both_sides_of_a_jump_in_a_store(kind, tmp_path, monkeypatch):
         np.testing.assert_allclose(forces, [5.0 + G, 0.0], atol=TIGHT)
         load = solution.reaction("load", "body")[0][:, 2] if kind == "table" else solution.actuation("load")[:, 0]
         np.testing.assert_allclose(sides(load, solution), [-5.0, 30.0], atol=TIGHT)
+
+
+@pytest.mark.parametrize("kind", ["sampled", "table"])
+def test_both_sides_of_a_jump_with_an_action_there(kind):
+    """The action takes friction away; the contact opens at once."""
+    scene = pushed((kind, -5.0, 30.0), (0, 0, 1), kinetic=0.3)
+
+    def reach(t, state):
+        return t - 0.1
+
+    reach.action = lambda change: change.set("floor.kinetic", 0.1)
+    solution = ts.simulate(scene, (0, 0.2), events=reach)
+    np.testing.assert_allclose(sides(solution.reaction("floor")[0][:, 2], solution), [5.0 + G, 0.0], atol=TIGHT)
+    assert solution.position("body")[-1, 2] == pytest.approx(0.5 * (30.0 - G) * 0.1**2, abs=TIGHT)
+
+
+@pytest.mark.parametrize("kind", ["sampled", "table"])
+def test_a_load_that_lifts_a_body_from_the_start(kind):
+    solution = ts.simulate(pushed((kind, 30.0, 30.0), (0, 0, 1)), (0, 0.2))
+    assert solution.position("body")[-1, 2] == pytest.approx(0.5 * (30.0 - G) * 0.2**2, abs=TIGHT)
+    assert solution.phases == [(0.0, 0.2, ())]

@@ -323,9 +323,12 @@ class Sampling:
                 reset()
 
     def of(self, prepared):
-        """Those of the next phase of the run, which go on."""
-        other = Sampling(prepared, True)
-        other.last = self.last
+        """Those of the next phase of the run, which go on; others than before where an action has changed them."""
+        other, known = (
+            Sampling(prepared, True),
+            {load.force.name: t for load, t in zip(self.loads, self.last, strict=True)},
+        )
+        other.last = [known.get(load.force.name, -math.inf) for load in other.loads]
         return other
 
     def saved(self):
@@ -341,16 +344,24 @@ class Sampling:
 
     def ask(self, memory, t, q, qd):
         """Evaluate the functions that are due at t, and hold their values."""
+        slots = self.take(memory.run.remembered, t, q, qd)
+        own = self.packed.system.memory[slots]
+        memory.context.system.reals[own] = memory.run.remembered[self.handles.count :][slots]
+
+    def take(self, remembered, t, q, qd):
+        """The same in what a run remembers; the slots that change."""
+        slots = []
         for i, load in enumerate(self.loads):
             force = load.force
             later = t - self.last[i] > 2.0 * _slack(t, force.period)  # a phase may begin by rounding after an instant
             if later and (not self.begun or is_due(t, force.period)):
-                angles, self.last[i] = memory.run.remembered[: self.handles.count], t
+                angles, self.last[i] = remembered[: self.handles.count], t
                 values = self._values(load, t, (q, qd), angles)
-                slots = np.arange(load.slot, load.slot + len(values))
-                memory.context.system.reals[self.packed.system.memory[slots]] = values
-                memory.run.remembered[self.handles.count + slots] = values
+                mine = range(load.slot, load.slot + len(values))
+                remembered[self.handles.count :][mine] = values
+                slots += mine
         self.begun = True
+        return slots
 
     def _values(self, load, t, levels, angles):
         """Values of a force's function; angles are the approximate ones that the run has counted."""

@@ -32,7 +32,7 @@ from ..model.handles import handles_of
 from ..observables import diagnostics
 from ..observables.state import remembered
 from ..observables.tolerances import LARGE
-from ..runs.driver import Sampling
+from ..runs.driver import Failed, Sampling
 from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
@@ -221,6 +221,8 @@ class _ContactRun(Transitions, Checkpoints):
 
     def begin(self):
         """Impact and closed contacts at the start; the Status if there is no way on, else None."""
+        if self.run_task is not None:
+            self._ask()
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
@@ -338,6 +340,16 @@ class _ContactRun(Transitions, Checkpoints):
             goes_on = self.known is not None or self.call.state is not None
             self.sampling = self.sampling.of(kept) if self.sampling else Sampling(kept, goes_on)
         return self.sampling
+
+    def _ask(self):
+        """Ask sampled functions that are due before contacts open or close: that depends on their values."""
+        kept = prepared(self._scene_of([], []))
+        if kept.sampled:
+            self.remembered = self.remembered.copy()
+            try:
+                self._sampling(kept).take(self.remembered, self.t, self.q, self.qd)
+            except Failed as failure:
+                raise InvalidForce(str(failure)) from failure.__cause__
 
     def _run_of(self, phase):
         """The `Run` of a phase, and the call of it."""
@@ -604,6 +616,7 @@ class _ContactRun(Transitions, Checkpoints):
             return Status.ACTION_FAILED
         if (self.qd != jump.qd).any():  # ratchets don't take hold as they would have
             fired = [i for i in fired if i not in self.gaps.following]
+        self._ask()
         status = self._transit(fired, False)
         hybrid.report(self, jump)
         if status is None:

@@ -14,7 +14,7 @@ from .tolerances import (
     DISTANT,
     EARLY,
     FROM_REST,
-    MOST_PARTS,
+    MOST_SURVEYS,
     ROOT,
     ROOT_STEPS,
     ROUGH_ROOT,
@@ -385,7 +385,7 @@ def find_first(search, context, run, first, second, arrays):
         samples = matrix(data_of(s.samples), degree + 2, m)
         if (
             degree == 0
-            or parts > MOST_PARTS
+            or parts > MOST_SURVEYS
             or (numbers.new != 0 and numbers.found < 0 and _may_have_fallen(s, samples))
         ):
             return UNSURE

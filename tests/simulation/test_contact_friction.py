@@ -15,7 +15,6 @@ from scipy.special import ellipk
 import tsdyn as ts
 from tests.helpers.processes import ROOT
 from tests.helpers.rough_boxes import FLOOR, G, boxes
-from tests.helpers.tolerances import EXACT
 
 C = ts.constraints
 
@@ -621,32 +620,6 @@ def test_a_solution_in_another_process(tmp_path):
     found = subprocess.run(command, cwd=ROOT, text=True, capture_output=True, timeout=300)
     assert found.returncode == 0, found.stderr
     np.testing.assert_array_equal(np.frombuffer(bytes.fromhex(found.stdout)), solution.multipliers.ravel())
-
-
-def bead(inside, angle, velocity, kinetic, gravity):
-    """A point mass on a ball, or in a bowl, of 0.5 m, at an angle from the equator."""
-    scene = ts.Scene(gravity=(0, 0, -gravity))
-    place = 0.5 * np.array([np.cos(angle), 0.0, (-1 if inside else 1) * np.sin(angle)])
-    point = scene.add_point_mass(1.0, position=place, velocity=velocity, name="bead")
-    law = {"radius_a": 0.0, "radius_b": 0.5, "inside": inside, "kinetic": kinetic, "name": "ball"}
-    scene.add(C.SphereContact(point, scene.ground, **law))
-    return scene
-
-
-def test_a_point_mass_slides_round_a_rough_bowl():
-    """v' = -mu v^2 / r along the equator, from 3 m/s."""
-    solution = ts.simulate(bead(True, 0.0, (0, 3, 0), 0.4, 0.0), (0, 1))
-    angle = np.log(1 + 0.4 * 3 / 0.5) / 0.4
-    np.testing.assert_allclose(solution.position("bead")[-1], (0.5 * np.cos(angle), 0.5 * np.sin(angle), 0), atol=1e-12)
-
-
-@pytest.mark.parametrize("inside", [False, True])
-def test_a_point_mass_sticks_to_a_rough_ball_or_bowl(inside):
-    """At 45 degrees friction of 1 holds it."""
-    for kinetic, sticks in ((0.999, False), (1.001, True)):
-        solution = ts.simulate(bead(inside, np.pi / 4, (0, 0, 0), kinetic, G), (0, 0.1))
-        assert solution.sticking("ball").all() == sticks
-        assert (motion(solution) < EXACT) == sticks
 
 
 def test_bad_coefficients():

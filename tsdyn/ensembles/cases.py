@@ -64,11 +64,6 @@ def keep_of(keep, times, packed):
     """What is kept: a word, or a function of the Solution, as which names of channels are taken; InvalidArgument."""
     if keep == TIMES and isinstance(keep, str) and not times.size:
         raise InvalidArgument("keep='t_eval' keeps the states at the times of t_eval=; give them.")
-    if keep == FINAL and isinstance(keep, str) and times.size:
-        raise InvalidArgument(
-            "keep='final', the default, keeps the last states alone: pass keep='t_eval' for those at t_eval, or leave "
-            "t_eval out."
-        )
     if callable(keep) or (isinstance(keep, str) and keep in (FINAL, TIMES)):
         return keep
     try:

@@ -96,7 +96,7 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
         `scene.parameters()`. Or a function of the case (0, 1, ...) that returns a mapping of names to values.
     t_span : (float, float), s
     keep : {"final", "t_eval"}, sequence of str, or callable
-        What is kept of each case: the last state, without `t_eval`; the states at its times; channels by name, such as
+        What is kept of each case: the last state; the states at the times of `t_eval`; channels by name, such as
         ["hinge.angle", "arm.position.z"], as of `Solution.plot`: over `t_eval` if it is given, else at the end; or what
         a function returns for the Solution: a number, an array, or a mapping of names to these.
     cases : int, optional

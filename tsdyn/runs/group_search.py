@@ -14,7 +14,7 @@ from .tolerances import (
     DISTANT,
     EARLY,
     FROM_REST,
-    MOST_DIVISIONS,
+    MOST_SURVEYS,
     ROOT,
     ROOT_STEPS,
     ROUGH_ROOT,
@@ -380,9 +380,14 @@ def find_first(search, context, run, first, second, arrays):
     for j in range(m):
         s.left[j] = 1
     while True:
+        parts += 1
         degree = _survey(s, step, t0, end, scratch[2], turning, roughly)
         samples = matrix(data_of(s.samples), degree + 2, m)
-        if degree == 0 or (numbers.new != 0 and numbers.found < 0 and _may_have_fallen(s, samples)):
+        if (
+            degree == 0
+            or parts > MOST_SURVEYS
+            or (numbers.new != 0 and numbers.found < 0 and _may_have_fallen(s, samples))
+        ):
             return UNSURE
         clear = _mark(s, samples)
         if clear == CLEAR and not (roughly and (end < t1 or not _are_far(s, samples))):
@@ -400,8 +405,7 @@ def find_first(search, context, run, first, second, arrays):
             return UNSURE
         width = end - t0
         if _first_root(s, step, scratch[0], width) != ARRIVED:
-            parts += 1
-            if until == end or parts > MOST_DIVISIONS:
+            if until == end:
                 return UNSURE
             end = until
             continue

@@ -122,9 +122,9 @@ FROM_REST, FALLEN = 1e-11, 1e-6
 # follow: (w h)^2 / 12 of an oscillation. Of the fastest coordinate: velocities that are rounding. Of the largest value
 # of a function: values far from zero, where those polynomials are off by some hundredths of a motion at most.
 SMOOTH, STEADY, DISTANT = 0.5, 1e-9, 0.05
-# Part of a step that is searched by itself for a zero early on. Divisions by true values at most: those by polynomials
-# come before.
-EARLY, MOST_DIVISIONS = 0.25, 8
+# Part of a step that is searched by itself for a zero early on, and the most surveys of parts: where values touch zero
+# they would shrink without end.
+EARLY, MOST_SURVEYS = 0.25, 24
 # Steps of Newton's method from the root of an interpolant; share of the step up to which a move that doesn't get
 # shorter is rounding.
 ROOT_STEPS, ROUGH_ROOT = 6, 1e-8

@@ -344,24 +344,21 @@ class Sampling:
 
     def ask(self, memory, t, q, qd):
         """Evaluate the functions that are due at t, and hold their values."""
-        slots = self.take(memory.run.remembered, t, q, qd)
-        own = self.packed.system.memory[slots]
-        memory.context.system.reals[own] = memory.run.remembered[self.handles.count :][slots]
+        self.take(memory.run.remembered, t, q, qd, memory.context.system.reals)
 
-    def take(self, remembered, t, q, qd):
-        """The same in what a run remembers; the slots that change."""
-        slots = []
+    def take(self, remembered, t, q, qd, reals=None):
+        """The same in what a run remembers, and in the numbers of a system."""
         for i, load in enumerate(self.loads):
             force = load.force
             later = t - self.last[i] > 2.0 * _slack(t, force.period)  # a phase may begin by rounding after an instant
             if later and (not self.begun or is_due(t, force.period)):
                 angles, self.last[i] = remembered[: self.handles.count], t
                 values = self._values(load, t, (q, qd), angles)
-                mine = range(load.slot, load.slot + len(values))
-                remembered[self.handles.count :][mine] = values
-                slots += mine
+                slots = np.arange(load.slot, load.slot + len(values))
+                if reals is not None:
+                    reals[self.packed.system.memory[slots]] = values
+                remembered[self.handles.count + slots] = values
         self.begun = True
-        return slots
 
     def _values(self, load, t, levels, angles):
         """Values of a force's function; angles are the approximate ones that the run has counted."""

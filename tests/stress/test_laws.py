@@ -209,6 +209,15 @@ def test_an_image_may_leave_a_motion_that_amplifies_rounding_and_no_other():
     assert found.broken
 
 
+@pytest.mark.slow
+def test_fixed_steps_are_judged_where_the_shortest_of_them_follow_the_motion():
+    """Slips of a small coin turn within 1e-6 s, where DOP853 makes most of its steps."""
+    coin = drawn(np.random.default_rng(6000308), 1, 3, {"coins": CONTACTS["coins"]})
+    assert not judgement._is_resolved(coin, judgement.run_case)
+    box = DrawnCase("sliding", sliding(), (0.0, 1.0), {"integrator": ts.integrators.Nystrom4(step=0.01)})
+    assert judgement._is_resolved(box, judgement.run_case)
+
+
 def test_reactions_of_rounding_do_not_pull():
     """Two particles touch while they fall: their reaction is rounding of their weights."""
     scene, apart = ts.Scene(), np.array([0.3, 0.1, 0.2]) / np.sqrt(0.14)

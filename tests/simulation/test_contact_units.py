@@ -118,6 +118,22 @@ def test_corners_share_friction_within_their_cones_in_small_units():
     np.testing.assert_allclose(0.15 * 25.0 * np.sin(5.0 * starts[1]), 0.3 * 9.81, rtol=1e-12)
 
 
+@pytest.mark.parametrize("length", [1e-6, 1.0, 1e6, 1e9])
+def test_all_corners_of_a_box_that_slides_hold_it_and_ask_for_finite_friction(length):
+    """It stops at v / (mu g). Two corners carry it, the reactions of a third are rounding."""
+    scene, size = ts.Scene(gravity=(0, 0, -9.81 * length)), length * np.array((0.6, 0.4, 0.2))
+    given = {"position": (0, 0, size[2] / 2), "velocity": (0.3 * length, 0.1 * length, 0)}
+    box = scene.add_body(**ts.shapes.box(size, mass=2.0), **given, name="box")
+    for i, corner in enumerate(CORNERS):
+        law = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.3, "name": f"foot {i}"}
+        scene.add(C.PlaneContact(box, scene.ground, point_a=size / 2 * (*corner, -1), **law))
+    solution = ts.simulate(scene, (0, 0.3)).raise_if_failed()
+    np.testing.assert_allclose([t for t, *_ in solution.phases], (0, np.hypot(0.3, 0.1) / 0.3 / 9.81), rtol=1e-9)
+    assert np.ptp(solution.position("box")[:, 2]) < 1e-12 * length
+    for i in range(4):
+        assert solution.friction_demand(f"foot {i}").max() < 0.3 + 1e-9
+
+
 def demand_same(make, units):
     """To rounding: of the last times of an accumulation, 1e-16 over the flights; of what redundant feet share.
 

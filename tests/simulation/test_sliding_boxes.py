@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import tsdyn as ts
 from tests.helpers.rough_boxes import FLOOR, G, boxes
@@ -222,3 +223,30 @@ def test_a_rod_that_turns_a_little_until_it_rests_stays_there(spin):
     assert abs(solution.phases[1][0] - end) < 1e-9 * end
     assert solution.kinetic_energy[-1] == 0.0
     assert np.diff(solution.kinetic_energy).max() <= 0.0
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_box_leaves_a_shaken_table_with_all_corners_at_once(order):
+    """Two corners carry it, as reactions aren't unique; it flies without a turn, and lands on all corners."""
+    A, w, half = 0.06, 15.0, 0.1
+    scene = ts.Scene(gravity=(0, 0, -G))
+    table = scene.add_body(mass=5.0, inertia=(1, 1, 1), name="table")
+    slide = scene.add(C.Translational.at(scene.ground, table, point=(0, 0, 0), axis=(0, 0, 1)))
+    scene.add(C.TranslationMotor.of(slide, displacement=lambda t: A * (1 - np.cos(w * t))))
+    box = scene.add_body(**ts.shapes.box((0.6, 0.4, 2 * half), mass=2.0), position=(0, 0, half), name="box")
+    for corner in corners((0.6, 0.4, 2 * half))[::order]:
+        scene.add(C.PlaneContact(box, table, point_a=corner, **FLOOR, kinetic=0.3))
+    off = np.arccos(-G / (A * w**2)) / w
+
+    def gap(t):
+        z, v = A * (1 - np.cos(w * off)), A * w * np.sin(w * off)
+        return z + v * (t - off) - G * (t - off) ** 2 / 2 - A * (1 - np.cos(w * t))
+
+    lands = brentq(gap, off + 0.01, off + 0.6, xtol=1e-15)
+    solution = ts.simulate(scene, (0, lands + 1e-3), dense_output=True).raise_if_failed()
+    assert [len(names) for *_, names in solution.phases[:2]] == [4, 0]
+    np.testing.assert_allclose([end for _, end, _ in solution.phases[:2]], [off, lands], rtol=0, atol=1e-10)
+    struck = 2.0 * (A * w * np.sin(w * lands) - A * w * np.sin(w * off) + G * (lands - off))
+    assert len(solution.impulses) == 4
+    np.testing.assert_allclose([p for *_, p in solution.impulses], struck / 4, rtol=1e-9)
+    assert np.abs(solution.angular_velocity("box")).max() < 1e-12

@@ -172,6 +172,17 @@ def test_phases_that_overlap_are_found():
     assert "phases in a row" in broken(solution)
 
 
+def with_tilted_image(case, x):
+    """A function like `run_case`, with a gravity that the image has alone; its bodies are in reverse order."""
+
+    def run(one, **options):
+        if one.scene.bodies[0].name != case.scene.bodies[0].name:
+            one = one._replace(scene=one.scene.with_parameters({"gravity": (x, 0, -9.81)}))
+        return judgement.run_case(one, **options)
+
+    return run
+
+
 def test_a_motion_that_the_mirror_changes_is_found():
     """Of a box that slides, a chain of hinges with stops, and ropes; then with a gravity that the image has alone."""
     seeds = ("stops", 5000003), ("ropes", 5000003), ("cradle", 5000001)
@@ -181,13 +192,30 @@ def test_a_motion_that_the_mirror_changes_is_found():
         assert [each.law for each in found] == ["motion of the mirrored scene"]
         assert not found[0].broken
 
-    def tilted(case, **options):
-        if case.scene is not cases[0].scene:
-            case = case._replace(scene=case.scene.with_parameters({"gravity": (0.01, 0, -9.81)}))
-        return judgement.run_case(case, **options)
-
-    [found] = judgement.mirrored(cases[0], judgement.run_case(cases[0]), tilted)
+    [found] = judgement.mirrored(cases[0], judgement.run_case(cases[0]), with_tilted_image(cases[0], 0.01))
     assert found.broken
+
+
+@pytest.mark.slow
+def test_an_image_may_leave_a_motion_that_amplifies_rounding_and_no_other():
+    """A body hangs from a pin with a play of 4 mm, along which it runs to and fro: 1e-14 of its start grow to 1e-3."""
+    case = drawn(np.random.default_rng(6000209), 1, 3, {"play": CONTACTS["play"]})
+    solution = judgement.run_case(case)
+    [found] = judgement.mirrored(case, solution, judgement.run_case)
+    assert found.size > 1e-4
+    assert not found.broken
+
+    [found] = judgement.mirrored(case, solution, with_tilted_image(case, 1e-4))
+    assert found.broken
+
+
+@pytest.mark.slow
+def test_fixed_steps_are_judged_where_the_shortest_of_them_follow_the_motion():
+    """Slips of a small coin turn within 1e-6 s, where DOP853 makes most of its steps."""
+    coin = drawn(np.random.default_rng(6000308), 1, 3, {"coins": CONTACTS["coins"]})
+    assert not judgement._is_resolved(coin, judgement.run_case)
+    box = DrawnCase("sliding", sliding(), (0.0, 1.0), {"integrator": ts.integrators.Nystrom4(step=0.01)})
+    assert judgement._is_resolved(box, judgement.run_case)
 
 
 def test_reactions_of_rounding_do_not_pull():

@@ -17,11 +17,12 @@ from ..elements.loops.constraint_rows import place_bodies, take_loads
 from ..elements.loops.coordinate_rows import BLOCK, INTS
 from ..elements.loops.friction import HERE
 from ..elements.markers import POINT
+from ..elements.unilateral import contacts_of
 from ..errors import InvalidBody, InvalidConstraint, RedundantConstraints
 from ..formulations.accelerations import find_reactions, normal_load
 from ..jit.kernels import entry, kernel, long_kernel, resident, stack, twin
 from ..maths.dense_linalg import copy
-from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
+from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE, RANK_TOL, TINY
 from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import classes, first_rows, handles_of, index_of
 from ..model.packed import has_friction, member_of, no_system
@@ -585,7 +586,12 @@ def friction_demand(motion, item):
     force = force if item.on is item.a else -force
     push = np.einsum("ki,ki->k", normal, force)
     tangential = np.linalg.norm(force - push[:, None] * normal, axis=1)
-    demand = np.where((push == 0.0) & (tangential == 0.0), 0.0, np.inf)
+    size, largest = np.hypot(push, tangential), np.zeros(push.size)
+    pulls = (push <= 0.0) & (size > 0.0)
+    if pulls.any():  # by rounding, beside what others carry
+        for other in contacts_of(handles_of(motion.packed).items):
+            largest = np.maximum(largest, np.linalg.norm(exerted(motion, other, None)[0], axis=1))
+    demand = np.where(pulls & (size > NEGLIGIBLE * largest), np.inf, 0.0)
     return np.divide(tangential, push, out=demand, where=push > 0.0)
 
 

@@ -594,9 +594,10 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def friction_demand(self, constraint: ItemLike) -> Floats:
         """Tangential over normal force at a contact, (k,): the coefficient of friction that rolling needs at least.
 
-        Infinite where the surfaces would have to pull, zero where they are apart. Contacts that share a load in many
-        ways, such as the lateral forces of two wheels on one axle, share it with the least sum of squares of their
-        forces. Arguments and errors as of `contact_point`.
+        Infinite where the surfaces would have to pull, zero where they are apart, or where both forces are rounding
+        beside those of other contacts. Contacts that share a load in many ways, such as the lateral forces of two
+        wheels on one axle, share it with the least sum of squares of their forces. Arguments and errors as of
+        `contact_point`.
 
         Examples
         --------

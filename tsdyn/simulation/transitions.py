@@ -27,7 +27,7 @@ from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
 from .scene_cache import prepared
-from .tolerances import ACCUMULATED, CREEPING, EVENTS_JUDGED, FLIGHT, MOST_AT_AN_INSTANT, ROUNDED
+from .tolerances import ACCUMULATED, CREEPING, EARLIER, EVENTS_JUDGED, FLIGHT, MOST_AT_AN_INSTANT, PRESSED, ROUNDED
 
 
 def contact_state(inertia, resting, qd, fired=()):
@@ -137,14 +137,21 @@ class Transitions:
             struck = self._largest(self.qd - qd)
             rounding = self._rounding(before) + NEGLIGIBLE * self.frictions.sizes(self.q, struck, self.length)
             self.modes, struck = UnitModes(), self.qd
-            if self.gaps.rough[resting].any():
-                self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)
+            rough = self.gaps.rough[resting].any()
+            while True:
+                if rough:
+                    self.qd, contacts = at_turn(inertia, resting, struck, leaving, turned, opening)
+                else:
+                    contacts = solve_contacts(inertia, resting, struck, leaving)
+                unloaded = self._unloaded(inertia, contacts, leaving, before) if struck is qd else []
+                if not unloaded:
+                    break
+                leaving = [*leaving, *unloaded]
+            if rough:
                 if self.qd is not struck and np.array_equal(struck, self.ended):
                     self.rest = self.t + stopping_time(inertia, resting, struck, self.qd, self.qdd, contacts.slow)
                 if self.qd is not struck and opening:
                     rates = inertia.rates(self.qd)
-            else:
-                contacts = solve_contacts(inertia, resting, self.qd, leaving)
             rounding += self.frictions.sizes(self.q, self.qd - struck, self.length)
             if opening:
                 self._open(inertia, opening, rates, -contacts.accelerations)
@@ -166,6 +173,28 @@ class Transitions:
                     "kinetic, or use a compliant contact."
                 )
             return Status.CONTACT_FAILED
+
+    def _unloaded(self, inertia, contacts, leaving, before):
+        """Closed gaps without reactions that leave with those `leaving`: what has pressed them has just vanished.
+
+        Where reactions aren't unique, two of four corners may carry a body. The others have had no reaction that could
+        vanish; when those of the two do, nothing presses them, either. A little earlier it did: accelerations go
+        through zero.
+        """
+        known, fell = {*before.closed, *before.idle}.difference(leaving), [i for i in leaving if i in before.closed]
+        which = [i for i in contacts.slack if i in known]
+        if not (which and fell and self.phases.starts):
+            return []
+        dt, slots = EARLIER * (self.t - self.phases.starts[-1]), self.remembered[self.count :]
+        q, qd = self.q - dt * self.qd, self.qd - dt * self.qdd
+        carrying = [i for i in contacts.closed if i not in contacts.slack]
+        earlier = Inertia(self.gaps, self.t - dt, q, slots, inertia.which.tolist(), carrying)
+        try:
+            pressed = contact_state(earlier, carrying, qd).accelerations
+        except NoSolution:
+            return []
+        least = PRESSED * LEVEL * earlier.accelerations(qd)[1]
+        return which if (pressed[which] < -least[which]).all() else []
 
     def _open(self, inertia, which, rates, a):
         """Open the gaps `which`, with these rates and decelerations a (count,).

@@ -11,6 +11,9 @@ MULTIPLE, TIGHTER, SHORTER, FALL = 1e3, 1e-3, 8.0, 0.1
 # Below this change relative to the size nothing is judged by convergence: it is rounding, amplified. Of dense output at
 # the ends of steps, and of output times beside steps, likewise.
 ROUNDED = 1e-10
+# Where a motion amplifies rounding: tilt of the gravity, rad, that shows by how much; the share of what it does that
+# rounding may do, at so many times. A tilt is some hundred roundings, which all steps have.
+TILTED, AMPLIFIED, SEEN = 1e-13, 10.0, 20
 # Of the ends of two runs past singular configurations, which amplify rounding; the other branch is off by far more.
 NEAR_SINGULAR_ENDS = 1e-4
 # Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by

@@ -59,7 +59,8 @@ from .unit_events import Breaking, Closing, Slowing
 # watches: of an open gap, from above, or of the reaction of a closed one. Then velocities jump by the impulses of an
 # impact, where gaps close; those that are closed and at rest stay so as the complementarity problem of accelerations
 # says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg, are left out
-# of the rows: the others hold them.
+# of the rows: the others hold them. They may do so to first order alone, as the ends of an edge on a face that tips: a
+# gap that falls ends the run.
 #
 # `UnitModes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
 
@@ -378,7 +379,7 @@ class _ContactRun(Transitions, Checkpoints):
         if self.decided[0] is not None or not (remembers and self.modes.same(before)):
             return False
         run.now[1], self.decided = self.qd, None
-        self.closing.open(self.modes.opened)
+        self.closing.open(self._starts())
         if self.halting is not None:
             self.halting.since[:] = np.inf  # slips that have turned have their directions from here
         self.again.append(t)
@@ -479,9 +480,9 @@ class _ContactRun(Transitions, Checkpoints):
             yield from self._rubbing(packed)
         else:
             leaving = Reactions(gaps, modes, packed).over
-        self.closing = Closing(gaps, modes.opened, modes.lifted)
+        self.closing = Closing(gaps, self._starts(), modes.lifted)
         for i in self.able:
-            if i in modes.idle or (modes.grips and i in modes.closed):
+            if (i in modes.idle and i in gaps.following) or (modes.grips and i in modes.closed):
                 continue
             is_open = i not in modes.closed
             function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
@@ -504,6 +505,11 @@ class _ContactRun(Transitions, Checkpoints):
                 continue
             function = GroupMember(breaking, loaded.index(i)) if i in loaded else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
+
+    def _starts(self):
+        """`Closing.open` of the phase: idle gaps count from the depth on that no event leaves."""
+        deep = PENETRATION * self.gaps.lengths(self.length)
+        return {**self.modes.opened, **{i: (self.t, 0.0, 0.0, deep[i]) for i in self.modes.idle}}
 
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""

@@ -45,18 +45,31 @@ class Transitions:
         measured: whether the energy that impacts take is noted; sunk: gaps that a start has taken below zero.
         """
         self.reason, qd = "", self.qd
-        if self._is_deep(sunk) or self._is_stuck():
+        if self._has_fallen(fired) or self._is_deep(sunk) or self._is_stuck():
             return Status.CONTACT_FAILED
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         # What was to rise by less than rounding, and has risen by more, is open
         hit = [i for i in fired if i < count and (i not in before.lifted or i in self.near)]
-        touching = {*self.near, *hit, *before.closed, *before.idle}.intersection(self.able)
+        low = FLIGHT * self.gaps.lengths(self.length)
+        idle = [i for i in before.idle if self.gap[i] <= low[i]]  # the others have opened
+        touching = {*self.near, *hit, *before.closed, *idle}.intersection(self.able)
         turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
         broken = [i - count for i in fired if count <= i < count + own]
         status = self._settle(sorted(touching), hit, broken, turned)
         if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status
+
+    def _has_fallen(self, fired):
+        """Whether gaps among the units `fired` have fallen that others were to hold; says so."""
+        fallen = [self.gaps.names[i] for i in fired if i in self.modes.idle]
+        if fallen:
+            self.reason = (
+                f"At t = {self.t:.9g} s other contacts no longer hold {listed(fallen, NAMED)}, as they did where the "
+                "phase began: which of them carry the load was not determined there, and those chosen may have "
+                "turned bodies. One contact at the middle of an edge in place of both ends determines the load."
+            )
+        return bool(fallen)
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""

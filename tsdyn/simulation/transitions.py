@@ -151,15 +151,18 @@ class Transitions:
             rounding = self._rounding(before) + NEGLIGIBLE * self.frictions.sizes(self.q, struck, self.length)
             self.modes, struck = UnitModes(), self.qd
             rough = self.gaps.rough[resting].any()
-            while True:
+
+            def settled(leaving):
                 if rough:
-                    self.qd, contacts = at_turn(inertia, resting, struck, leaving, turned, opening)
-                else:
-                    contacts = solve_contacts(inertia, resting, struck, leaving)
-                unloaded = self._unloaded(inertia, contacts, leaving, before) if struck is qd else []
-                if not unloaded:
+                    return at_turn(inertia, resting, struck, leaving, turned, opening)
+                return struck, solve_contacts(inertia, resting, struck, leaving)
+
+            self.qd, contacts = settled(leaving)
+            while struck is qd and (unloaded := self._unloaded(inertia, contacts, leaving, before)):
+                found = settled([*leaving, *unloaded])
+                if {*found[1].closed, *found[1].idle}.intersection(unloaded):  # others press them now
                     break
-                leaving = [*leaving, *unloaded]
+                leaving, (self.qd, contacts) = [*leaving, *unloaded], found
             if rough:
                 if self.qd is not struck and np.array_equal(struck, self.ended):
                     self.rest = self.t + stopping_time(inertia, resting, struck, self.qd, self.qdd, contacts.slow)

@@ -280,7 +280,7 @@ def _shaken(solution):
     friction of slower slips is not determined.
     """
     other, method = copy(solution), solution._method
-    for name in ("multipliers", "_memory"):
+    for name in ("multipliers", "_memory", "_shifted"):
         vars(other).pop(name, None)
     signs = np.random.default_rng(0).choice((-1.0, 1.0), solution.q.shape)
     other.q = solution.q + EPS * np.abs(solution.q).max() * signs

@@ -312,6 +312,19 @@ def test_a_stop_counts_turns(bound):
     assert abs(solution.angle(hinge)[-1] - bound) < 1e-13 * abs(bound)
 
 
+def test_an_angle_at_an_impact_after_a_long_step():
+    """A rod at rest, which a ball of 10 m/s sets turning at 8 rad/s after 2 s: its turns count from the impact on."""
+    scene = ts.Scene()
+    rod = scene.add_body(1.0, (1.0, 1.0, 1.0), name="rod")
+    hinge = scene.add(C.Revolute.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 0, 1)))
+    ball = scene.add_point_mass(1.0, position=(0.5, -20.0, 0), velocity=(0, 10.0, 0))
+    scene.add(C.PlaneContact(ball, rod, normal_b=(0, -1, 0), unilateral=True, restitution=1.0))
+    solution = ts.simulate(scene, (0, 2.1), dense_output=True)
+    t = solution.impulses[0][0]
+    np.testing.assert_allclose(solution.at([np.nextafter(t, 0), t, t + 0.1]).angle(hinge), (0, 0, 0.8), atol=1e-12)
+    assert abs(solution.at(t).angle_rate(hinge) - 8.0) < 1e-12
+
+
 @pytest.mark.parametrize(
     ("size", "share", "gravity"), [(1.0, 1.0, 0.0), (1e6, 1.0, 0.0), (1e-6, 1.0, 0.0), (1.0, 1e-3, 10.0)]
 )

@@ -539,10 +539,7 @@ class Trajectory:
         slots = self.reading.system.memory.size
         if not len(self.blocks):
             return np.repeat(self.first[None], t.size, axis=0), np.zeros((t.size, slots)), Status.SUCCESS
-        rows = np.searchsorted(self.blocks[:, B_END], t)
-        if self.asked.size:
-            later = np.searchsorted(self.blocks[:, B_END], t, side="right")
-            rows = np.minimum(np.where(np.isin(t, self.asked), later, rows), len(self.blocks) - 1)
+        rows = self._steps_of(t)
         order = np.argsort(rows, kind="stable")  # so that a chart is made once
         out = np.empty((t.size, *self.first.shape))
         reader = self.reading.reader()
@@ -550,11 +547,19 @@ class Trajectory:
         self.reading.give(reader)
         return out, self.blocks[rows, self.blocks.shape[1] - slots :], status
 
+    def _steps_of(self, t):
+        """The steps (k,) that times t (k,) lie in."""
+        rows = np.searchsorted(self.blocks[:, B_END], t)
+        if self.asked.size:
+            later = np.searchsorted(self.blocks[:, B_END], t, side="right")
+            rows = np.minimum(np.where(np.isin(t, self.asked), later, rows), len(self.blocks) - 1)
+        return rows
+
     def anchors(self, t):
         """The starts (k,) of the steps that times t (k,) lie in, and the angles (k, count) of joints there."""
         if not len(self.blocks):
             return np.full(t.size, self.start), np.repeat(self.angles[None], t.size, axis=0)
-        rows = np.searchsorted(self.blocks[:, B_END], t)
+        rows = self._steps_of(t)
         end = self.blocks.shape[1] - self.reading.system.memory.size
         kept = self.blocks[:, end - self.angles.size : end]
         if self.reading.shift:

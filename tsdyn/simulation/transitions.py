@@ -207,10 +207,12 @@ class Transitions:
         earlier = Inertia(self.gaps, self.t - dt, q, slots, inertia.which.tolist(), carrying)
         try:
             pressed = contact_state(earlier, carrying, qd).accelerations
+            least = PRESSED * LEVEL * earlier.accelerations(qd)[1]
         except NoSolution:
             return []
-        least = PRESSED * LEVEL * earlier.accelerations(qd)[1]
-        return which if (pressed[which] < -least[which]).all() else []
+        finally:
+            inertia.free(inertia.J[:0].T)  # the factors are those of the present state again
+        return [i for i in which if pressed[i] < -least[i]]
 
     def _open(self, inertia, which, rates, a):
         """Open the gaps `which`, with these rates and decelerations a (count,).

@@ -90,6 +90,9 @@ KEPT_SMALL = {
     ("rough_ropes", 6000258): "a taut rope turns a joint with friction back at its dead centre",
     ("rough_ropes", 6000263): "the same, where loads of the joint that would stick have no limit",
     ("shaken", 6000183): "two rows of slips that nearly depend on each other don't hold a box",
+    ("stack", 9000148): "a corner that others press, where one that carried has let go, stays closed",
+    ("shaken", 8000100): "an output where a table jumps has the reaction before",
+    ("chain_over_floor", 9000211): "the turns of a joint at an impact, in dense output",
 }
 
 

@@ -444,12 +444,12 @@ def depends(inertia, closed, i, sticks=()):
     own, alone, mobile = inertia.response[i], inertia.J[i], np.diag(inertia.G)
     if mobile[i] <= RANK_TOL**2 * mobile.max():  # bilateral rows hold it
         return True
-    least = RANK_TOL**2 * (np.abs(alone) @ np.abs(own))  # in the metric of kinetic energy: of any units
     if not closed:
-        return not inertia.G[i, i] > least
+        return not inertia.G[i, i] > RANK_TOL**2 * (np.abs(alone) @ np.abs(own))
     rows, loads = inertia.J[closed], inertia.response[closed]
     if len(sticks):
         slips = inertia.tangents[sticks].reshape(2 * len(sticks), -1)
         rows, loads = np.concatenate([rows, slips]), np.concatenate([loads, inertia.free(slips.T).T])
     share = least_squares(product(rows, loads.T), rows @ own, RANK_TOL**2)
-    return bool((alone - share @ rows) @ (own - share @ loads) <= least)
+    lengths = inertia.gaps.levers(inertia.q)
+    return bool(np.linalg.norm(lengths * (own - share @ loads)) <= RANK_TOL * np.linalg.norm(lengths * own))

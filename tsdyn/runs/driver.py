@@ -173,9 +173,7 @@ class Slices:
         # Aim at SLICE_SECONDS
         if seconds > 2 * SLICE_SECONDS:
             self.most = max(int(rows * SLICE_SECONDS / seconds), 1)
-        elif (
-            seconds < SLICE_SECONDS / 2 and 2 * self.run.numbers.history >= rows
-        ):  # a run that begins again takes a row
+        elif seconds < SLICE_SECONDS / 2 and 2 * self.run.numbers.history >= rows:  # beginning again takes a row, too
             self.most = min(2 * self.most, self.recorder.most)
 
     def _look_up(self):
@@ -324,10 +322,8 @@ class Sampling:
 
     def of(self, prepared):
         """Those of the next phase of the run, which go on; others than before where an action has changed them."""
-        other, known = (
-            Sampling(prepared, True),
-            {load.force.name: t for load, t in zip(self.loads, self.last, strict=True)},
-        )
+        other = Sampling(prepared, True)
+        known = {load.force.name: t for load, t in zip(self.loads, self.last, strict=True)}
         other.last = [known.get(load.force.name, -math.inf) for load in other.loads]
         return other
 

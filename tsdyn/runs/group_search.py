@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import Record, callback, caller, data_of, entry, kernel, loader, matrix, resident, seen
+from ..jit.kernels import Record, callback, caller, data_of, entry, kernel, loader, matrix, resident, seen, twin
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
 from ..model.laws import interrupts_answered
@@ -372,7 +372,7 @@ def find_first(search, context, run, first, second, arrays):
     s, a = load_search(search), load_arrays(arrays)
     t0, t1 = s.numbers.t0, s.numbers.t1
     step = SearchedStep(context, run, a.block, a.charts, a.points, first, second, t0, a.before, t1, a.now)
-    numbers, m, end, width, roughly, parts = s.numbers, s.value.size, t1, t1 - t0, _is_smooth(step), 0
+    numbers, m, end, width, roughly, surveys = s.numbers, s.value.size, t1, t1 - t0, _is_smooth(step), 0
     turning = max(_turn_rate(s.spins, a.before[1]), _turn_rate(s.spins, a.now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 3, m)
     copy(s.value, scratch[2])
@@ -380,12 +380,12 @@ def find_first(search, context, run, first, second, arrays):
     for j in range(m):
         s.left[j] = 1
     while True:
-        parts += 1
+        surveys += 1
         degree = _survey(s, step, t0, end, scratch[2], turning, roughly)
         samples = matrix(data_of(s.samples), degree + 2, m)
         if (
             degree == 0
-            or parts > MOST_SURVEYS
+            or surveys > MOST_SURVEYS
             or (numbers.new != 0 and numbers.found < 0 and _may_have_fallen(s, samples))
         ):
             return UNSURE
@@ -553,7 +553,7 @@ class GroupSearch:
             contexts = self.address, context, run, *self.contexts
             found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
         elif found == CLEAR:
-            self.parts.value[:], self.parts.odd[:], numbers.new = self.parts.last, 0, 0
+            twin(take_step)(self.parts)
         if found == FOUND:
             known[numbers.t] = self.parts.state.copy()
         return None if found == UNSURE else numbers.found

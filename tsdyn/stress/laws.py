@@ -1,6 +1,5 @@
 """Laws that hold of every run, whatever its scene: no reference solution is needed."""
 
-from copy import copy
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
@@ -279,9 +278,7 @@ def _shaken(solution):
     Velocities are off by ten tolerances, as the error of a run may be, where contacts slide: the direction of the
     friction of slower slips is not determined.
     """
-    other, method = copy(solution), solution._method
-    for name in ("multipliers", "_memory", "_shifted"):
-        vars(other).pop(name, None)
+    other, method = solution._picked(slice(None)), solution._method  # without what is derived
     signs = np.random.default_rng(0).choice((-1.0, 1.0), solution.q.shape)
     other.q = solution.q + EPS * np.abs(solution.q).max() * signs
     if method.atol is not None and any(getattr(part, "has_friction", False) for part in solution.scene.constraints):

@@ -373,7 +373,7 @@ def drawn(rng, least=None, most=None, kinds=KINDS):
     if name not in CONTACTS:
         moving(d)
     method = str(rng.choice(METHODS))
-    options = d.options if method == "default" else d.options | {"integrator": method}
+    options = dict(d.options) if method == "default" else d.options | {"integrator": method}
     if method == "nystrom4":
         options = d.options | {"integrator": d.fixed_step()}
     elif method != "taylor":

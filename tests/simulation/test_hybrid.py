@@ -5,7 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.methods import one_of_each
-from tests.helpers.tolerances import FINE, NEAR
+from tests.helpers.tolerances import FINE, NEAR, ROUNDING
 
 C, F = ts.constraints, ts.forces
 METHODS = one_of_each(tol=1e-10, step=1e-3)
@@ -242,6 +242,40 @@ def test_an_impulse_on_a_hinged_body_moves_it_as_the_hinge_lets_it():
     assert abs(solution.angle_rate("hinge")[-1] - 3.0 * 2.0 / 6.0) < FINE
     after = solution.linear_momentum[np.flatnonzero(solution.t >= 0.5)[1]]
     assert abs(np.linalg.norm(after) - 3.0) < FINE
+
+
+@pytest.mark.parametrize("length", [1e-8, 1.0, 1e3, 1e8])
+def test_impulses_in_all_units(length):
+    """A rod is closed between two balls that fly apart and is struck, beside a door: momenta are those of impulses."""
+    L = length
+    scene = ts.Scene(gravity=(0, 0, 0))
+    balls = [
+        scene.add_body(
+            float(k), k * L**2 * np.ones(3), (L * k, 0.3 * L * k, 0), velocity=L * np.array((k, k * k, 0.1))
+        )
+        for k in (1, 2)
+    ]  # fmt: skip
+    door = scene.add_body(3.0, L**2 * np.array((40.0, 5.0, 35.0)), position=(-3 * L, L, 0), name="door")
+    scene.add(C.Revolute.at(scene.ground, door, point=(-4 * L, L, 0), axis=(0.6, 0, 0.8)))
+    points = L * np.array((0.1, 0, 0)), L * np.array((0, 0.2, 0))
+    scene.add(C.Distance(*balls, point_a=points[0], point_b=points[1], length=L, name="rod"))
+    scene.deactivate("rod")
+    blow, ends = L * np.array((-1.3, 2.1, -0.8)), []
+
+    def close(change):
+        ends.extend(map(change.state.position, balls, points))
+        change.set("rod.length", np.linalg.norm(ends[1] - ends[0]))
+        change.activate("rod")
+        change.impulse(balls[0], blow)
+
+    solution = ts.simulate(scene, (0, 1), events=at(0.5, close)).raise_if_failed()
+    before, after = np.flatnonzero(solution.t == 0.5)
+    gained = [k * (solution.velocity(ball)[after] - solution.velocity(ball)[before]) for k, ball in enumerate(balls, 1)]
+    (P,) = (impulse for _, name, impulse in solution.impulses if name == "rod")
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    assert np.abs(sum(gained) - blow).max() < ROUNDING * L
+    assert np.abs(gained[1] + P * along).max() < ROUNDING * L
+    assert P > 0.1 * L
 
 
 # Events

@@ -345,19 +345,6 @@ def farthest_first(rows):
     return order, np.abs(R.diagonal())
 
 
-def range_and_null_space(rows):
-    """Orthonormal bases Q1 (n, r) of the span of rows (m, n) and Z (n, n - r) of what is normal to it, by pivoted QR.
-
-    Also R (r, r) and the order (r,) of independent rows: rows[order] = R^T Q1^T.
-    """
-    from scipy.linalg import qr
-
-    Q, R, order = qr(rows.T, pivoting=True)
-    size = np.abs(np.diag(R))
-    rank = int((size > RANK_TOL * size.max(initial=0.0)).sum())
-    return Q[:, :rank], Q[:, rank:], R[:rank, :rank], order[:rank]
-
-
 def dependent(A):
     """Return the dependent rows of a dense A; pivoted QR chooses the independent ones."""
     order, far = farthest_first(unit_rows(A))

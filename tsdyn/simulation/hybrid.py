@@ -9,7 +9,7 @@ import numpy as np
 from ..calls import fitting_methods
 from ..elements.bodies import START, PointMass, named, rotation_matrix, transform_g
 from ..errors import InvalidArgument, InvalidBody, SingularConfiguration
-from ..maths.dense_linalg import range_and_null_space
+from ..maths.dense_linalg import dependent, row_lengths
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import handles_of
 from ..observables.evaluate import NO_INERTIA, constraint_arrays, mass_matrix
@@ -320,27 +320,43 @@ class JumpRows:
 
     def jumped(self, qd, load):
         """Velocities (n,) with M (v - qd) + B^T P = load, B v + Phi_t = 0."""
-        from scipy.linalg import cho_factor, cho_solve, solve_triangular
+        from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
-        B = self.Phi_q[self.bilateral]
-        own, Z, R, order = range_and_null_space(B)
-        change = np.zeros(qd.size)
-        if order.size:
-            rates = -(B @ qd + self.Phi_t[self.bilateral])[order]
-            change = own @ solve_triangular(R, rates, trans="T")
+        D, B, sizes = self._scaled(self.bilateral)
+        M = self.M / np.outer(D, D)
+        order = np.delete(np.arange(len(B)), dependent(B))
+        Q, R = qr(B[order].T)
+        own, Z = np.split(Q, [order.size], axis=1)
+        rates = -(self.Phi_q[self.bilateral] @ qd + self.Phi_t[self.bilateral])[order]
+        change = own @ solve_triangular(R[: order.size], rates / sizes[order], trans="T")
         if Z.size:
             try:
-                factor = cho_factor(Z.T @ self.M @ Z)
+                factor = cho_factor(Z.T @ M @ Z)
             except np.linalg.LinAlgError as error:
                 raise SingularConfiguration(NO_INERTIA) from error
-            change = change + Z @ cho_solve(factor, Z.T @ (load - self.M @ change))
-        return qd + change
+            change = change + Z @ cho_solve(factor, Z.T @ (load / D - M @ change))
+        return qd + change / D
 
     def impulses(self, load, closed):
         """Impulses P (m,) of the bilateral rows and those of closed gaps, with Phi_q^T P = load; of least size."""
         rows, P = np.concatenate((self.bilateral, self.gaps.all_rows(closed))), np.zeros(self.Phi.size)
-        P[rows] = np.linalg.lstsq(self.Phi_q[rows].T, load, rcond=RANK_TOL)[0]
+        D, B, sizes = self._scaled(rows)
+        P[rows] = np.linalg.lstsq(B.T, load / D, rcond=RANK_TOL)[0] / sizes
         return P
+
+    def _scaled(self, which):
+        """D (n,), B (k, n), sizes (k,) with Phi_q = sizes B D of some rows: unit rows in coordinates of unit inertia.
+
+        Alike in all units: a basis mixes coordinates, and inertias of m and rad differ by the square of a length.
+        """
+        D = np.sqrt(self.M.diagonal())
+        for at, length in self.packed.system.bodies:  # which of the four is zero depends on the orientation
+            D[at + 3 : at + length] = D[at + 3 : at + length].max(initial=0.0)
+        D[D == 0.0] = D.max(initial=0.0) or 1.0
+        rows = self.Phi_q[which]
+        B = rows / D
+        sizes = np.where(row_lengths(rows) > 0.0, np.linalg.norm(B, axis=1), 1.0)
+        return D, B / sizes[:, None], sizes
 
 
 def with_values(scene, values):

@@ -27,7 +27,7 @@ from .dense_output import Trajectory
 from .events import Watch
 from .run_log import CHART_ROOM, NO_ROWS, RecordedEnd, Recorder, RunLog, left_open
 from .task import Outcome
-from .tolerances import GETTING_ON, HOPELESS_STEPS, MOST_INSTANTS, NOISY, PACED, SLICE_SECONDS, TRIES
+from .tolerances import GETTING_ON, HOPELESS_STEPS, MOST_INSTANTS, NOISY, PACED, PACED_WORK, SLICE_SECONDS, TRIES
 
 # A run in slices: the compiled driver is called again and again, with room for the records of each slice.
 #
@@ -56,24 +56,30 @@ class Pace:
     ----------
     t : float, s
         Where it begins.
+    weight : int
+        Of its memory.
+
+    Attributes
+    ----------
+    due : int
+        Steps of the segment after which it is judged next.
     """
 
-    def __init__(self, t):
-        self.t, self.tries, self.before = t, 0, 0.0  # since when, how many; s a try before that
+    def __init__(self, t, weight):
+        self.t, self.steps, self.due, self.before = t, 0, PACED, 0.0  # since when; s a step before that
+        self.most = PACED * max(PACED_WORK // weight, 1)  # steps from one judgement to the next
 
-    def judge(self, t, tries, end):
-        """Status and reason of a run that is at t after `tries` more steps."""
-        self.tries += tries
-        if self.tries < PACED:
-            return SLICE_DONE, ""
+    def judge(self, t, steps, end):
+        """Status and reason of a run that is at t after so many steps."""
         # s of motion a step
-        before, now = self.before, (t - self.t) / self.tries
-        self.t, self.tries, self.before = t, 0, now
+        made = steps - self.steps
+        before, now = self.before, (t - self.t) / made
+        self.t, self.steps, self.due, self.before = t, steps, steps + min(2 * made, self.most), now
         if now > 0.0 and (end - t <= HOPELESS_STEPS * now or now > GETTING_ON * before):
             return SLICE_DONE, ""
         left = f"{(end - t) / now:.0e} more" if now > 0.0 else "infinitely many more"
         return Status.STEP_COLLAPSED, (
-            f"At the pace of the last {PACED} steps the rest would take {left}; give max_steps to continue."
+            f"At the pace of the last {made} steps the rest would take {left}; give max_steps to continue."
         )
 
 
@@ -100,7 +106,7 @@ class Slices:
     @cached_property
     def pace(self):
         """The `Pace` of the run."""
-        return Pace(self.task.span[0])
+        return Pace(self.task.span[0], self.memory.weight)
 
     def drive(self, first=None):
         """Advance until the end, from the `StartedRun` of a run on."""
@@ -128,12 +134,10 @@ class Slices:
                             self.task.archive.stop(self.saved)
 
     def _rows(self):
-        """Steps of the next slice, which ends where another method is considered: that mustn't depend on the clock."""
+        """Steps of the next slice. It ends where something is decided: results must not depend on the clock."""
         steps = self.run.numbers.steps
-        rows = min(self.most, self.limit - steps)
-        # Another method is considered after a number of steps, not of seconds: results must not depend on the clock
-        ask = 0 if self.choose is None else self.choose.ask
-        return min(rows, ask - steps) if ask > steps else rows
+        due = [0 if self.choose is None else self.choose.ask, self.pace.due]
+        return min([self.most, self.limit - steps, *(at - steps for at in due if at > steps)])
 
     def _advance(self, rows):
         """One slice; the seconds that it has taken."""
@@ -193,8 +197,8 @@ class Slices:
         if self.status is not SLICE_DONE:
             return
         # A run that would never end is ended
-        if task.max_steps is None and run.numbers.adaptive:
-            self.status, self.reason = self.pace.judge(run.clock.t, run.numbers.history, end)
+        if run.numbers.steps >= self.pace.due and task.max_steps is None and run.numbers.adaptive:
+            self.status, self.reason = self.pace.judge(t, run.numbers.steps, end)
             if self.status is SLICE_DONE and end - t > NOISY * run.clock.h:
                 self._look_for_noise(t)
         # A checkpoint is due

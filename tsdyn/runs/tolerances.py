@@ -141,10 +141,12 @@ LONG_STEPS = 1 << 13
 # Numbers that are set to zero at once, so that Ctrl-C is answered: new memory takes up to 1 ns a byte.
 PIECE = 1 << 22
 
-# Steps over which the progress of a run is measured; a run that needs HOPELESS_STEPS more would take days.
-PACED, HOPELESS_STEPS = 1000, 1e10
+# Steps after which the progress of a run is judged first, as many as in a first slice; each judgement takes twice the
+# steps of the one before, up to PACED_WORK over the weight of a step times as many as the first, a quarter of a second.
+# A run that needs HOPELESS_STEPS more would take days.
+PACED, PACED_WORK, HOPELESS_STEPS = 1024, 256, 1e10
 
-# Functions are checked for noise if a run needs more steps than this at the present length: a second or more.
+# Functions are checked for noise, where progress is judged, if a run needs more steps than this at the present length.
 NOISY = 1e6
 
 # The run counts as progressing if simulated time per step has more than doubled since the last check.

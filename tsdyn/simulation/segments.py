@@ -131,7 +131,7 @@ class Turns:
             self.most_lost = max(self.most_lost, self.lost)
             return self._back(memory, steps, min(rate, work / steps / run.clock.h))
         if self.tried:
-            return self._tried(steps, rate)
+            return self._tried(steps, rate, run.numbers.stiff)
         return bool(run.numbers.stiff) and self._to_implicit(run, steps, t, max(rate, self._step / run.clock.h))
 
     def _to_implicit(self, run, steps, t, ours):
@@ -169,14 +169,14 @@ class Turns:
         dear = rate > max(limits.SETTLED / steps, 1.0) ** 2 * self.known
         return bool(self.tried or (dear and (rough or self.lost > limits.RISKED * self.known * left)))
 
-    def _tried(self, steps, rate):
+    def _tried(self, steps, rate, stiff):
         """Whether the explicit method, after some steps, has failed to take less work."""
         self.ask = 2 * steps
         if steps < limits.TRIED and rate < limits.AGAIN * self.known:
             return False
         self.tried = False
-        if rate < self.known:
-            self.ask = 0
+        if rate < self.known:  # one that has been found stiff meanwhile has paid all the same
+            self.ask = limits.AGAIN * steps if stiff else 0
             return False
         self.patience, self.taken, self.known = limits.AGAIN * self.patience, self.taken + steps, rate
         return True

@@ -1,6 +1,7 @@
 """Runs of the default method that turn to the implicit method and back: one run, whoever makes its steps."""
 
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,6 +88,18 @@ def test_what_the_solution_says(turned, tmp_path):
 def test_turns_do_not_depend_on_slices(turned, monkeypatch):
     monkeypatch.setattr(driver, "FIRST_SLICE", 3)
     np.testing.assert_array_equal(ts.simulate(jointed(), (0.0, END), **OPTIONS).q, turned.q)
+
+
+def test_a_won_trial_in_which_stiffness_was_found_is_looked_at_after_a_number_of_steps():
+    """Not where the slice ends, though the motion has been found stiff already."""
+    scene = jointed()
+    turns = segments.Turns(scene, None, ts.integrators.DOP853(), None, (0.0, END), False)
+    turns.tried, turns.known, steps = True, np.inf, segments.limits.TRIED
+    numbers, clock = SimpleNamespace(steps=steps, stiff=1, at_limit=20), SimpleNamespace(t=1.0, h=1e-9)
+    engine = SimpleNamespace(method=ts.integrators.DOP853())
+    assert not turns.turns(SimpleNamespace(run=SimpleNamespace(numbers=numbers, clock=clock), engine=engine))
+    assert not turns.tried
+    assert turns.ask > steps
 
 
 def test_steps_in_all_segments_count(turned):

@@ -454,13 +454,18 @@ class RestProblem:
         pushes = np.where(np.isin(u, pushing), 1.0, -1.0) * acts
         G, across = self.G[np.ix_(u, u)] * acts[:, None] * pushes, self.G[np.ix_(u, stick)] * acts[:, None]
         by_u = least_squares(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, u)] * pushes, RANK_TOL**2)
-        G = G - product(across, by_u)
+        alone, G = np.diag(G), G - product(across, by_u)
+        # Rows that the units at rest hold move by rounding, which is no compliance: reactions would be rounding over it
+        dead = np.diag(G) <= RANK_TOL * alone
+        G[dead], G[:, dead] = 0.0, 0.0
         for _ in range(ITERATIONS):
             y = x + P @ N
             bounds, y[self._held(balls)] = [np.linalg.norm(y[self.at[i]]) for i in balls], 0.0
             own = self.c + self.G @ y + self.D @ N
             held = least_squares(self.G[np.ix_(stick, stick)], own[stick], RANK_TOL**2)
-            p, mode, _ = self.cones.solve(G, own[u] * acts - across @ held, bounds)
+            left, terms = own[u] * acts - across @ held, np.abs(own[u]) + np.abs(across) @ np.abs(held)
+            left[dead & (np.abs(left) <= LEVEL * terms)] = 0.0
+            p, mode, _ = self.cones.solve(G, left, bounds)
             y[u[acts]] = (pushes * p)[acts]
             y[stick] = -held - by_u @ p
             before = N

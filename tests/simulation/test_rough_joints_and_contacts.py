@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tests.helpers.calls import same_run
@@ -194,6 +195,31 @@ def gripper(squeeze, mu=0.4):
         place = {"point_b": (-0.1 * side, 0, 0), "normal_b": (-side, 0, 0)}
         scene.add(C.PlaneContact(load, jaw, **place, unilateral=True, kinetic=mu, name=f"pad {side}"))
     return scene
+
+
+@pytest.mark.parametrize("seed", [98, 114, 158, 0])
+def test_what_a_rope_has_stopped_sticks_between_both_coefficients(seed):
+    """A pan swings up until its rope is taut; its weight of 0.23 N m is between 0.2 and 0.26 N m of its hinge.
+
+    The rope, which the stuck hinge leaves no motion, has no share of the load, whatever its rounding.
+    """
+    rng, tilt, d = np.random.default_rng(seed), -0.3, 0.023
+    bearing = Rotation.from_rotvec((0, 0, rng.uniform(0.0, 2.0 * np.pi)))
+    pose = bearing * Rotation.from_rotvec((0, -tilt, 0))
+    scene = ts.Scene(gravity=(0, 0, -10.0))
+    pan = scene.add_body(
+        1.0, (0.1, 0.2, 0.3), position=pose.apply((d, 0, 0)), orientation=pose.as_quat(scalar_first=True),
+        velocity=pose.apply((0, 0, 5.0 * d)), angular_velocity=(0, -5.0, 0), name="pan",
+    )  # fmt: skip
+    hinge = scene.add(C.Revolute.at(scene.ground, pan, point=(0, 0, 0), axis=bearing.apply((0, 1, 0)), name="hinge"))
+    anchor, hook = rng.uniform((0.2, -0.3, -1.5), (0.8, 0.3, -0.5)), np.array((0.5, 0.1, 0.0))
+    points = [(scene.ground, bearing.apply(anchor)), (pan, hook - (d, 0, 0))]
+    scene.add(C.Rope(points, length=np.linalg.norm(hook - anchor), name="rope"))
+    friction = scene.add(F.RevoluteFriction(hinge, radius=0.1, kinetic=0.2, static=0.26))
+    solution = ts.simulate(scene, (0, 0.5))
+    assert [names for *_, names in solution.phases] == [(), ("rope", friction.name)]
+    assert solution.sticking(friction)[-1]
+    assert np.abs(solution.position(pan)[-1] - bearing.apply((d, 0, 0))).max() < HELD
 
 
 def test_a_gripper_holds_and_drops_its_load():

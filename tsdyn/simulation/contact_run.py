@@ -29,6 +29,7 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS, NEGLIGIBLE
 from ..model.handles import handles_of
+from ..motions.tolerances import TOGETHER
 from ..observables import diagnostics
 from ..observables.state import remembered
 from ..observables.tolerances import LARGE
@@ -337,7 +338,9 @@ class _ContactRun(Transitions, Checkpoints):
 
     def _stops(self, stops):
         """The stops of a phase, with the end of flights that are none: outputs of every step have that instant."""
-        if not (self.per_step and self.t < self.rest < self.span[1]):
+        near = TOGETHER * max(map(abs, self.span))
+        known = np.append(stops[:, 0], (self.t, self.span[1]))
+        if not self.per_step or not self.t < self.rest < self.span[1] or np.abs(known - self.rest).min() <= near:
             return stops
         return np.insert(stops, np.searchsorted(stops[:, 0], self.rest), (self.rest, 0.0, self.rest), axis=0)
 

@@ -31,6 +31,7 @@ from ..maths.tolerances import EPS, NEGLIGIBLE
 from ..model.handles import handles_of
 from ..motions.tolerances import TOGETHER
 from ..observables import diagnostics
+from ..observables.reactions import singular_place
 from ..observables.state import remembered
 from ..observables.tolerances import LARGE
 from ..runs.driver import Failed, Sampling
@@ -228,6 +229,9 @@ class _ContactRun(Transitions, Checkpoints):
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
+        parts = [part for i in touching for part in self.gaps.list[i].parts]
+        if place := singular_place(self.scene.packed, self.q, parts):
+            raise SingularConfiguration(f"{place}: a singular configuration. Start from another one.")
         return self._settle(touching, (), ())
 
     def check(self):

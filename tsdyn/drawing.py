@@ -101,6 +101,23 @@ class Tabulated(Drawn):
         return html_table(rows[1:], "\n".join(filter(None, above)), *rows[:1]) + (notes and f"<p>{notes}</p>")
 
 
+class Listing(list[Any]):
+    """A list whose text, and picture in a notebook, is a table: `heads`, and `_cells` of an entry."""
+
+    heads: tuple[str, ...] = ()
+
+    def _cells(self, entry: Any) -> Sequence[str]:
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        rows = [self.heads, *map(self._cells, self)]
+        return "\n".join(aligned(rows, range(len(self.heads))))
+
+    def _repr_html_(self) -> str:
+        """The table in a notebook."""
+        return html_table(map(self._cells, self), heads=self.heads)
+
+
 def html_table(rows: Iterable[Sequence[str]], caption: str = "", heads: Sequence[str] = (), named: bool = False) -> str:
     """A table of texts for notebooks; named: the first one of each row is a head."""
     lines = [[f"<th>{_escaped(cell)}</th>" for cell in heads]] if heads else []

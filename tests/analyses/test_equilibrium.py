@@ -187,6 +187,14 @@ def test_all_directions_neutral():
     assert repr(found) == "<Equilibrium: stable, 1 neutral>"
 
 
+def test_what_is_held_altogether_has_no_stiffness():
+    scene = ts.Scene(gravity=DOWN)
+    stone = scene.add_point_mass(mass=1.0, name="stone")
+    law = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.3}
+    scene.add(C.PlaneContact(stone, scene.ground, **law))
+    assert repr(scene.equilibrium()) == "<Equilibrium: stable, nothing can move>"
+
+
 def test_hanging_chain_of_rigid_links_from_a_rough_guess():
     """Between two supports: the pull along the span is the same everywhere, and the supports carry the weight."""
     count, length = 7, 0.3

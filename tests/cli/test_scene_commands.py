@@ -212,6 +212,16 @@ def test_wrong_usage(words, code, said, folder, capsys):
     assert sorted(folder.iterdir()) == before
 
 
+def test_rows_of_contacts_with_friction_are_counted(folder, capsys):
+    body = "[[body]]\nname = 'stone'\ntype = 'PointMass'\nmass = 1.0\n"
+    contact = "[[constraint]]\ntype = 'PlaneContact'\nname = 'floor'\na = 'stone'\nb = 'ground'\n"
+    law = "normal_b = [0, 0, 1]\nunilateral = true\nkinetic = 0.3\n"
+    (folder / "stone.toml").write_text(f"version = 1\n{body}{contact}{law}")
+    assert "floor  PlaneContact  3 rows" in called(capsys, "info", "stone.toml")[1]
+    found = json.loads(called(capsys, "info", "stone.toml", "--json")[1])
+    assert [item["rows"] for item in found["constraints"]] == [3]
+
+
 def test_robots(folder, capsys):
     pytest.importorskip("lxml")
     link = "<inertial><mass value='2'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
@@ -229,6 +239,9 @@ def test_robots(folder, capsys):
     code, out, _ = called(capsys, "info", "arm.urdf", "--free-base", "--json")
     assert (code, json.loads(out)["degrees_of_freedom"]) == (0, 6)
     assert called(capsys, "run", "arm.urdf", "--to", "0.1")[0] == 0
+    assert called(capsys, "convert", "arm.urdf", "stops.toml", "--limits")[0] == 0
+    stop = ts.load("stops.toml")["limits of hinge"]
+    assert (stop.lower, stop.upper) == (0.0, 1.0)
     assert "is for URDF files" in called(capsys, "run", "bars.toml", "--free-base")[2]
 
 

@@ -323,6 +323,21 @@ def test_a_disc_that_lies_flat_is_named(slip):
         assert np.isfinite(solution.q).all()
 
 
+def test_a_disc_that_lands_flat_is_named():
+    """It is refused where it lies; in flight, where it stays flat, the run ends as it lands, at sqrt(2 h / g)."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    body = scene.add_body(1.0, (0.08, 0.08, 0.15), name="coin")
+    law = {"normal_b": UP, "kinetic": 0.3, "name": "rolls"}
+    scene.add(C.RollingDisc(body, scene.ground, axis_a=UP, radius=0.5, **law))
+    with pytest.raises(ts.SingularConfiguration, match="'rolls' contact: the disc lies flat on its plane"):
+        ts.simulate(scene, (0, 1))
+    body.position = (0, 0, 0.2)
+    solution = ts.simulate(scene, (0, 1))
+    assert solution.status is ts.Status.CONTACT_FAILED
+    assert "'rolls' contact: the disc lies flat on its plane" in solution.message
+    assert abs(solution.reached - 0.2) < 1e-12
+
+
 @pytest.mark.slow
 def test_a_disc_whose_equilibrium_is_flat_is_named():
     """A ball with its centroid off its centre rolls to where that is lowest; a coin would fall flat."""

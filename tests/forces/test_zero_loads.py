@@ -1,4 +1,4 @@
-"""Forces of zero: refused when they are made, as if forgotten; values of studies, edits and files may be zero."""
+"""Forces of zero: refused when they are made, as if forgotten; those given, and of studies, edits and files, may be."""
 
 import numpy as np
 import pytest
@@ -54,6 +54,25 @@ def test_a_force_of_zero_is_kept_by_edits_and_files(kind, tmp_path):
         loaded = ts.load(tmp_path / "idle.toml")
         assert loaded["load"].is_idle
         assert ts.simulate(loaded, SPAN).state.q.tobytes() == ts.simulate(idle, SPAN).state.q.tobytes()
+
+
+def test_a_push_of_zero_waits_for_an_action():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    body = scene.add_body(2.0, (1, 1, 2.0), name="body")
+    scene.add(ts.forces.PointForce(body, force=(0, 0, 0), name="push"))
+    scene.add(ts.forces.Torque(body, torque=(0, 0, 0), name="twist"))
+
+    def late(t, state):
+        return t - 1.0
+
+    def action(change):
+        change.set("push.force", (4.0, 0, 0))
+        change.set("twist.torque", (0, 0, 2.0))
+
+    late.action = action
+    solution = ts.simulate(scene, (0, 2), events=late)
+    same(solution.position("body")[-1], (0.5 * 2.0, 0, 0))
+    same(solution.angular_velocity("body")[-1], (0, 0, 1.0))
 
 
 def test_a_file_that_says_nothing_of_a_force_is_refused(tmp_path):

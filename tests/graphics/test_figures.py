@@ -90,6 +90,19 @@ def test_contacts_are_bars_with_ticks_of_impacts():
     assert [label.get_text() for label in ax.get_yticklabels()] == ["floor"]
 
 
+def test_a_contact_that_sticks_is_a_bar_of_another_colour():
+    """A block slides for 0.5 s."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    block = scene.add_point_mass(mass=1.0, velocity=(1, 0, 0), name="block")
+    contact = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.2, "name": "floor"}
+    scene.add(ts.constraints.PlaneContact(block, scene.ground, **contact))
+    (bars,) = ts.plots.contacts(ts.simulate(scene, (0, 1.0))).collections
+    ends = [bar.vertices[:, 0].max() for bar in bars.get_paths()]
+    np.testing.assert_allclose(ends, [0.5, 1.0])
+    slides, sticks = bars.get_facecolor()
+    assert not np.array_equal(slides, sticks)
+
+
 def test_phase_portraits_and_sections_are_of_the_coordinate(run):
     ax = ts.plots.phase_portrait(run, "pin 0")
     assert labelled(ax)

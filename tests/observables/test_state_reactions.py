@@ -75,3 +75,19 @@ def test_wrong_arguments():
         state.reaction("rod", on=scene.ground)
     with pytest.raises(ts.InvalidArgument, match="knows no bodies"):
         ts.State(0.0, *np.zeros((3, 3)), np.zeros(1)).reaction("rod")
+
+
+def test_states_of_runs_and_events_are_shown_as_states():
+    scene = ts.Scene(gravity=(0, 0, -10))
+    bob = scene.add_point_mass(mass=2.0, position=(0, 0, -1), name="bob")
+    scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    seen = []
+
+    def half(t, state):
+        return t - 0.5
+
+    half.action = lambda change: seen.append(repr(change.state))
+    solution = ts.simulate(scene, (0, 1.0), events=half)
+    assert seen[0].startswith("State(t=0.5, q=array([")
+    assert "multipliers=array([" in seen[0]
+    assert repr(solution.state).startswith("State(t=1.0, q=array([")

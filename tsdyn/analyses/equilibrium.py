@@ -414,6 +414,8 @@ class Equilibrium:
         kind = "stable" if self.stable else "unstable"
         neutral = f", {self.neutral} neutral" if self.neutral else ""
         moving = " in steady motion" if self.state.qd.any() else ""
+        if np.isnan(self.smallest_stiffness):
+            return f"<Equilibrium: {kind}, nothing can move>"
         if neutral and self.smallest_stiffness == 0.0:
             return f"<Equilibrium{moving}: {kind}{neutral}>"
         which = "smallest other stiffness" if neutral else "smallest stiffness"

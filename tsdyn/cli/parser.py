@@ -105,7 +105,7 @@ def _meant(word, known):
 
 def robot_options(parsed):
     """What the command line says of a file of a robot."""
-    return {"free_base": parsed.free_base, "outside": parsed.outside}
+    return {name: getattr(parsed, name) for name in ("free_base", "outside", "limits")}
 
 
 def load_run(where, allow_code=False, robot=MappingProxyType({})):
@@ -120,7 +120,7 @@ def load_run(where, allow_code=False, robot=MappingProxyType({})):
             print(f"tsdyn: {where}: not carried over: {lost}; tsdyn check lists each.", file=sys.stderr)
         return scene, given
     if any(robot.values()):
-        raise InvalidArgument("--free-base is for URDF files, and --outside for URDF, MJCF and SDF files.")
+        raise InvalidArgument("--free-base is for URDF files, --outside and --limits for URDF, MJCF and SDF files.")
     return load_scene(where), {}
 
 
@@ -146,7 +146,7 @@ def load_scene(where, allow_code=False, robot=MappingProxyType({})):
     allow_code : bool
         Whether a TOML file may import modules of plug-ins.
     robot : dict
-        Options of `ts.load` for files of robots: free_base and outside.
+        Options of `ts.load` for files of robots: free_base, outside and limits.
 
     Raises
     ------

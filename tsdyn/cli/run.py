@@ -96,6 +96,7 @@ def add_scene(parser, metavar="SCENE", optional=False):
     )
     parser.add_argument("--free-base", action="store_true", help="the root link of a URDF is free to move")
     parser.add_argument("--outside", action="store_true", help="a file of a robot may name files outside its folder")
+    parser.add_argument("--limits", action="store_true", help="limits of joints in a file of a robot become stops")
     parser.add_argument("--allow-code", action="store_true", help="import modules that the file names for plug-ins")
 
 

@@ -98,7 +98,7 @@ def _info(parsed):
         return 0
     print(f"{parsed.scene}: {scene!r}")
     _print_table("bodies", [(body.name, type(body).__name__, f"{body.mass:g} kg") for body in scene.bodies])
-    items = [(item.name, type(item).__name__, counted(item.all_rows, "row")) for item in scene._added]
+    items = [(item.name, type(item).__name__, counted(len(item.row_labels), "row")) for item in scene._added]
     _print_table("constraints", items)
     _print_table("forces", [(force.name, force._kind(), "") for force in scene.forces])
     if parsed.parameters:
@@ -122,7 +122,9 @@ def _facts(scene, mobility, why, given):
     units = parameters.units
     return {
         "bodies": [{"name": body.name, "type": type(body).__name__, "mass": float(body.mass)} for body in scene.bodies],
-        "constraints": [{"name": it.name, "type": type(it).__name__, "rows": it.all_rows} for it in scene._added],
+        "constraints": [
+            {"name": item.name, "type": type(item).__name__, "rows": len(item.row_labels)} for item in scene._added
+        ],
         "forces": [{"name": force.name, "type": force._kind()} for force in scene.forces],
         "coordinates": mobility.coordinates,
         "rows": mobility.rows,

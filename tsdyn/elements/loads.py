@@ -255,7 +255,7 @@ class Given:
     Raises
     ------
     InvalidForce
-        If the vector is not three finite numbers or a function of t or of (t, state), is zero, or the frame is unknown.
+        If the vector is not three finite numbers or a function of t or of (t, state), or the frame is unknown.
     InvalidBody
         If a torque is on a point mass.
     """
@@ -276,6 +276,9 @@ class Given:
         if value is None:
             raise InvalidForce(f"{self.name}: no {self.given} given; set {self.given}={hint}, or a function of time.")
         setattr(self, self.given, value)
+
+    def demand_effect(self) -> None:
+        """Zero is given, not forgotten: an action, an edit or a study may set another vector."""
 
     def parameters(self) -> tuple[Any, ...]:
         """The vector."""

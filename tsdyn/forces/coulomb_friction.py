@@ -51,7 +51,7 @@ class CoulombFriction(BodyFriction, Force):
         Magnitude of the friction force: coefficient of friction times normal force.
     torque : float, N m
         Magnitude of the friction torque.
-    static_force, static_torque : float, N or N m, optional
+    static_force, static_torque : float, N and N m, optional
         The largest ones at rest, no less than those while sliding (default): the bodies stick up to them.
     slip_velocity : float, m/s
         0 (default) for the exact, set-valued law: the bodies stick or slide, and change at events. A velocity asks for

@@ -147,7 +147,9 @@ def charts(solution: Solution, ax: Any = None) -> Any:
 
 @figure_of("phases", "impulses")
 def contacts(solution: Solution, ax: Any = None) -> Any:
-    """Draw when contacts, stops and ropes are closed, a bar for each, with its impacts. Arguments as for `energy`.
+    """Draw when contacts, stops and ropes are closed, a bar for each, with its impacts; what sticks, in blue.
+
+    Arguments as for `energy`.
 
     Examples
     --------
@@ -162,21 +164,24 @@ def contacts(solution: Solution, ax: Any = None) -> Any:
     ['floor']
     """
     ax, bars, hits = axes_of(ax), {}, {}
-    for start, end, names in solution.phases:
-        for name in names:
-            mine = bars.setdefault(name, [])
-            if mine and mine[-1][1] == start:  # it stays closed
-                start, _ = mine.pop()
-            mine.append((start, end))
+    for phase in solution.phases:
+        for name in phase.names:
+            mine, colour, start = bars.setdefault(name, []), BLUE if name in phase.sticking else GREEN, phase.start
+            if mine and mine[-1][1:] == (start, colour):  # it stays as it is
+                start, *_ = mine.pop()
+            mine.append((start, phase.end, colour))
     for t, name, _ in solution.impulses:
         hits.setdefault(name, []).append(t)
     names = list(dict.fromkeys([*hits, *bars]))
     for i, name in enumerate(names):
-        ax.broken_barh([(start, end - start) for start, end in bars.get(name, [])], (i - 0.3, 0.6), color=GREEN)
+        mine = bars.get(name, [])
+        spans, colours = [(start, end - start) for start, end, _ in mine], [colour for *_, colour in mine]
+        ax.broken_barh(spans, (i - 0.3, 0.6), color=colours or GREEN)
         ax.plot(mine := hits.get(name, []), [i] * len(mine), "|", color=VERMILION, markersize=9)
     ax.set_yticks(range(len(names)), names)
+    ax.set_ylim(-1.0, max(len(names), 3.0))
     ax.set_xlabel("time (s)")
-    ax.set_title("closed (bars), impacts (ticks)", loc="left", fontsize="small")
+    ax.set_title("closed (bars; blue: sticks), impacts (ticks)", loc="left", fontsize="small")
     bare(ax)
     return ax
 

@@ -671,14 +671,19 @@ def touching(packed, member, q):
     return None
 
 
-def singular_place(packed, q):
-    """Name the first constraint whose own singular place is at q (n,), and say what it is; "" elsewhere."""
+def singular_place(packed, q, among=None):
+    """Name the first constraint whose own singular place is at q (n,), and say what it is; "" elsewhere.
+
+    among: primitives, by default all.
+    """
     known = packed.derived.with_singular_places
     if known is None:
         parts = enumerate(packed.constraints)
         known = packed.derived.with_singular_places = [i for i, part in parts if hasattr(type(part), "singular_place")]
     for i in known:
         part = packed.constraints[i]
+        if among is not None and part not in among:
+            continue
         said = twin(type(part).singular_place)(_markers(packed, i, q[None])[:, 0], packed.parameters[i])
         if said:
             return f"{part.name}: {said}"

@@ -120,6 +120,9 @@ class RememberingState(State):
         state.packed, state.memory, state.anchor = packed, memory, anchor
         return state
 
+    def __repr__(self) -> str:
+        return repr(State(*self))
+
     def _replace(self, **changes: Any) -> RememberingState:
         state = self.of(self.packed, self.memory, self.anchor, *super()._replace(**changes))
         state.phase = self.phase
@@ -220,6 +223,9 @@ class EventInstant(Exerting, Kinematics):
         """Multipliers (m,)."""
         parts = (part[None] for part in (self.q, self.qd, self.qdd))
         return multipliers(self.packed, np.array([self.t]), *parts, self.memory[None])[0]
+
+    def __repr__(self) -> str:
+        return repr(State(*self))
 
     def __iter__(self):
         return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))

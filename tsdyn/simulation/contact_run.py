@@ -29,7 +29,9 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS, NEGLIGIBLE
 from ..model.handles import handles_of
+from ..motions.tolerances import TOGETHER
 from ..observables import diagnostics
+from ..observables.reactions import singular_place
 from ..observables.state import remembered
 from ..observables.tolerances import LARGE
 from ..runs.driver import Failed, Sampling
@@ -227,6 +229,9 @@ class _ContactRun(Transitions, Checkpoints):
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
+        parts = [part for i in touching for part in self.gaps.list[i].parts]
+        if place := singular_place(self.scene.packed, self.q, parts):
+            raise SingularConfiguration(f"{place}: a singular configuration. Start from another one.")
         return self._settle(touching, (), ())
 
     def check(self):
@@ -262,7 +267,7 @@ class _ContactRun(Transitions, Checkpoints):
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), resume=self, archive=self.archive,
+                max_steps=self._steps_left(), resume=self, archive=self.archive, stops=self._stops(task.stops),
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
@@ -334,6 +339,14 @@ class _ContactRun(Transitions, Checkpoints):
             archive.shift, archive.skips, archive.passed = 0.0, False, []
             self.written = dict(archive.counts)
             archive.look_up(lambda: ({"t": self.t, "between": True}, {}))
+
+    def _stops(self, stops):
+        """The stops of a phase, with the end of flights that are none: outputs of every step have that instant."""
+        near = TOGETHER * max(map(abs, self.span))
+        known = np.append(stops[:, 0], (self.t, self.span[1]))
+        if not self.per_step or not self.t < self.rest < self.span[1] or np.abs(known - self.rest).min() <= near:
+            return stops
+        return np.insert(stops, np.searchsorted(stops[:, 0], self.rest), (self.rest, 0.0, self.rest), axis=0)
 
     def _sampling(self, kept):
         """The sampled loads of a phase, which go on from those of the one before."""
@@ -449,12 +462,12 @@ class _ContactRun(Transitions, Checkpoints):
         return Hold(unit, rank, self.remembered[np.array(places, int)])
 
     def _names(self):
-        """Names of the units whose rows hold; those of contacts that stick stand there twice."""
+        """Names of the units whose rows hold; those that stick stand there twice."""
         held = sorted([*self.modes.closed, *self.modes.idle])
         closed = [self.gaps.names[i] for i in held]
-        sticking = [self.gaps.names[i] for i in held if self.modes.sticks(i)]
-        sticking += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *self._idle_frictions()])]
-        return *dict.fromkeys(closed), *dict.fromkeys(sticking)
+        gripping = [self.gaps.names[i] for i in held if self.modes.sticks(i)]
+        frictions = [self.frictions.names[i] for i in sorted([*self.modes.sticking, *self._idle_frictions()])]
+        return *dict.fromkeys([*closed, *frictions]), *dict.fromkeys([*gripping, *frictions])
 
     def _idle_frictions(self):
         """Frictions that others hold, or a motor, without a force."""

@@ -89,6 +89,7 @@ def impact(
     Returns
     -------
     state : State
+        A start of another run; its accelerations and multipliers are zeros.
     impulses : dict of str to Impulse
         By names of the contacts; as of `solution.impulses`.
 

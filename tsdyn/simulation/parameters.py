@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 # Units of attributes, read from where they are described: the docstrings of classes and attributes.
 
-_UNIT = re.compile(r"(1|(kg|m|s|N|J|W|rad)(\^\d)?([ /](kg|m|s|N|J|W|rad)(\^\d)?)*)$")
+_UNIT = re.compile(r"(1|(kg|m|s|N|J|W|rad)(\^\d)?([ /](kg|m|s|N|J|W|rad)(\^\d)?)*|rad or m)$")
 _ENTRY = re.compile(r"(?m)^([\w, ]+) : (.*)$")
 
 

@@ -2,9 +2,12 @@
 
 import json
 from dataclasses import dataclass, field
+from itertools import starmap
+from typing import NamedTuple
 
 import numpy as np
 
+from ..drawing import Listing
 from ..errors import StorageError
 from ..formulations.locked_orientations import keep_turning
 from ..model.handles import first_rows, handles_of
@@ -91,6 +94,58 @@ class Impulse(float):
         return np.array(self._tangential, float)
 
 
+class _Phase(NamedTuple):
+    start: float
+    end: float
+    names: tuple[str, ...]
+
+
+class RunPhase(_Phase):
+    """Start and end of a phase, s, and the names of what holds in it.
+
+    Attributes
+    ----------
+    start, end : float, s
+    names : tuple of str
+        Closed contacts, frictions that stick, and parts that come and go where they are active.
+    sticking : tuple of str
+        Those of them that stick.
+    """
+
+    sticking: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, start, end, held):
+        """From a list of names, in which those that stick stand twice."""
+        made = cls(start, end, tuple(dict.fromkeys(held)))
+        made.sticking = tuple(name for name in made.names if held.count(name) > 1)
+        return made
+
+
+class PhaseList(Listing):
+    """The phases of a run."""
+
+    heads = "start (s)", "end (s)", "holds", "sticks"
+
+    def _cells(self, entry):
+        return [f"{entry.start:.9g}", f"{entry.end:.9g}", ", ".join(entry.names), ", ".join(entry.sticking)]
+
+
+class ImpulseList(Listing):
+    """The impulses of a run."""
+
+    heads = "time (s)", "of", "impulse (N s or N m s)", "of friction, on a (N s)"
+
+    def _cells(self, entry):
+        t, name, p = entry
+        rubs = isinstance(p, Impulse) and p.tangential.any()
+        return [f"{t:.9g}", name, _numbers(p), _numbers(p.tangential) if rubs else ""]
+
+
+def _numbers(p):
+    return ", ".join(f"{x:.6g}" for x in np.atleast_1d(p) + 0.0)
+
+
 RECORD = {"modes": list, "derived": list, "names": list, "contacts": list, "changes": list, "changed": list}
 
 
@@ -107,7 +162,7 @@ class Phases:
     Attributes
     ----------
     list : list of (float, float, tuple of str)
-        Start, end (s) and names of the closed contacts, then of what sticks.
+        Start, end (s) and names of the closed contacts, then of what sticks, which stand there twice.
     impulses : list of (float, str, Impulse or ndarray)
         Time (s), name, impulse: see `Solution.impulses`.
     starts : list of float
@@ -234,7 +289,7 @@ class Phases:
             else:
                 found.append((start, end, names))
             struck = False
-        return [(start, end, tuple(dict.fromkeys(names))) for start, end, names in found]
+        return PhaseList(starmap(RunPhase.of, found))
 
     def sticking(self, numbers, i):
         """Whether a contact with friction sticks (k,); i: the number of its gap."""

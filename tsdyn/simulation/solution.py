@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, Integers, ItemLike, Scene
+    from .phases import RunPhase
 
 
 # What shows a run: an animation, and figures.
@@ -383,13 +384,18 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         return Anchor(angles, t - start, (states[back, 0], states[back, 1]))
 
     @property
-    def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Start and end (s) of each phase, and the names of what holds only in some.
+    def phases(self) -> list[RunPhase]:
+        """The phases of the run: (start, end, names) of each, in s, with names of what holds only in some.
 
         These are closed contacts, frictions that stick, and those active of the parts that come and go by actions. A
-        phase ends, too, where a closed contact begins or ends to stick: see `sticking`.
+        phase ends, too, where a closed contact begins or ends to stick: `phase.sticking` has the names of those that
+        stick. `print(solution.phases)` shows a table.
         """
-        return [(self.span[0], self.reached, ())] if self._phases is None else self._phases.merged()
+        if self._phases is None:
+            from .phases import PhaseList, RunPhase
+
+            return PhaseList([RunPhase(self.span[0], self.reached, ())])
+        return self._phases.merged()
 
     @property
     def impulses(self) -> list[tuple[float, str, float]]:
@@ -398,9 +404,11 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         N s, or N m s of an angle. Of a contact a float, the normal impulse, whose `tangential` (3,) is the impulse of
         its friction on a, ground frame; negative, about the square root of rounding, where an impact elsewhere lifts
         the contact by less than rounding: it stays closed. Of a constraint of several rows an array (rows,) as of
-        `multipliers`, of a body an array (3,) in the ground frame.
+        `multipliers`, of a body an array (3,) in the ground frame. `print(solution.impulses)` shows a table.
         """
-        return [] if self._phases is None else list(self._phases.impulses)
+        from .phases import ImpulseList
+
+        return ImpulseList([] if self._phases is None else self._phases.impulses)
 
     @property
     def steps(self) -> Steps:

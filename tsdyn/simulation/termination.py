@@ -241,7 +241,7 @@ def _jump(solution):
 def suspect(solution, scene):
     """Name the nearly singular item at the last state."""
     ends = Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED
-    if solution.status not in (*ends, Status.NOT_FINITE):
+    if solution.status not in (*ends, Status.NOT_FINITE, Status.CONTACT_FAILED):
         return ""
     place = singular_place(solution.packed, solution._last[0])
     if place:

@@ -304,7 +304,8 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
     p, mode, mu = cones.solve(G, b)
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
     _demand_unique(G, d, mu, mode)
-    gdd = c + inertia.J @ (response @ p)
+    push = response @ p
+    gdd = c + inertia.J @ push
     small, carried = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)), inertia.carried()
     mode = _sharing(G, b, p, mode, cones, gaps.levers(inertia.q)[:, None] * response)
     moves, sizes = ((A @ x + y).reshape(-1, 3)[:, 1:] for A, x, y in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
@@ -342,7 +343,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
     slack = slack_of(inertia, closed, pushes, small)
     gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
     rows = _independent(inertia, closed, grips)
-    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains, begun, cones.slow)
+    found = ContactState(closed, sorted(idle + spare), gdd, push, grips, rows, slack, gains, begun, cones.slow)
     return found, bool((pushes < -rounding).any())
 
 

@@ -562,7 +562,7 @@ def _in_proportion(bounds, slips, p):
     size = np.hypot(*share[:, 1:].T)
     if size.max(initial=0.0) > 1.0 - MARGIN and np.ptp(size) > EVENT_ERROR:
         ways = null_space(rows[some].T, RANK_TOL)
-        shares = np.zeros((*share.shape, k := ways.shape[1]))
-        shares[:, 1:] = (ways / weight[some, None] ** 2).reshape(-1, 2, k)
-        T[some] += ways @ inwards(share.ravel(), shares.reshape(-1, k), MARGIN) if k else 0.0
+        across = np.reshape(ways / weight[some, None] ** 2, (len(share), 2, ways.shape[1]))
+        shares = np.insert(across, 0, 0.0, axis=1).reshape(share.size, ways.shape[1])
+        T[some] += ways @ inwards(share.ravel(), shares, MARGIN)
     return np.column_stack([p[:, 0], T.reshape(-1, 2)])

@@ -126,7 +126,7 @@ def inwards(u, ways, most):
     They are zero where u are as deep as `most`.
     """
     k = ways.shape[1]
-    some = np.repeat(np.abs(ways).reshape(-1, 3 * k).max(axis=1) > RANK_TOL, 3)
+    some = np.repeat(np.abs(ways).reshape(u.size // 3, 3 * k).max(axis=1, initial=0.0) > RANK_TOL, 3)
     start, B = u[some], np.column_stack([ways, np.tile([-1.0, 0.0, 0.0], u.size // 3)])[some]
     margin = (start[::3] - np.hypot(start[1::3], start[2::3])).min(initial=most)
     if margin >= most:

@@ -154,3 +154,23 @@ def test_a_body_that_is_pulled_aside_sticks_as_long_as_friction_can_hold_it(poin
     for contact in contacts:
         load, friction = solution.reaction(contact)[0][:, 2], solution.reaction(contact)[0][:, :2]
         assert (np.linalg.norm(friction, axis=1) <= 0.5 * load * (1 + 1e-9)).all()
+
+
+def test_a_wall_without_friction_braces_a_rod_that_sticks():
+    """Pushed at its end, the rod turns about the wall: one end holds half of the force, the other one pulls as much."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    rod = scene.add_body(1.0, (0.1, 0.1, 0.1))
+    law = {"normal_b": Z, "unilateral": True, "kinetic": 0.5}
+    ends = [scene.add(C.PlaneContact(rod, scene.ground, point_a=(x, 0, 0), **law)) for x in (0.5, -0.5)]
+    wall = scene.add(C.PlaneContact(rod, scene.ground, normal_b=(0, -1, 0), unilateral=True))
+    scene.add(ts.forces.PointForce(rod, point_a=(0.5, 0, 0), force=lambda t: np.array([0.0, t, 0.0])))
+    solution = ts.simulate(scene, (0, 5))
+    *_, begin = (end for _, end, _ in solution.phases if end < 5)
+    assert abs(begin - 4.905) < 1e-9
+    resting = solution.t < begin
+    np.testing.assert_allclose(solution.q[resting], solution.q[:1].repeat(resting.sum(), axis=0), atol=1e-14)
+    force, friction = solution.t[resting], [solution.reaction(end)[0][resting, 1] for end in ends]
+    assert (np.abs(friction) <= 2.4525 * (1 + 1e-9)).all()
+    balance = friction[0] + friction[1] + solution.reaction(wall)[0][resting, 1] + force
+    np.testing.assert_allclose(balance, 0.0, atol=1e-12)
+    assert abs(solution.angular_velocity(rod)[-1, 2]) > 1e-3

@@ -182,8 +182,12 @@ class Gaps:
         return self.sign[which, None] * self.workspace.rows(t, q, np.array(which))[0]
 
     def responses(self, t, q, memory, which):
-        """Accelerations (k, 3, n) by unit reactions of these gaps, normal and along both slips, with all gaps open."""
-        rows = np.concatenate([self.normals(t, q, which)[:, None], self.slopes(t, q, which)], axis=1)
+        """Accelerations (k, 3, n) by unit reactions of these gaps, normal and along both slips, with all gaps open.
+
+        Those without friction have no slips, and their reactions the unit of those with friction.
+        """
+        slopes = np.where(self.rough[which][:, None, None], self.slopes(t, q, which), 0.0)
+        rows = np.concatenate([self.normals(t, q, which)[:, None], slopes], axis=1)
         return self.workspace.respond(t, q, memory, rows.reshape(3 * len(which), -1)).reshape(len(which), 3, -1)
 
     def biases(self, gamma):

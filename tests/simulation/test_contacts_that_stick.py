@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq, minimize
 
 import tsdyn as ts
 from tsdyn.configuration.mobility import mobility_at
@@ -106,3 +107,70 @@ def test_boxes_that_topple_slip_at_one_corner_first():
     assert half[0] < both[0] - 1e-5
     assert half[1] > both[0] + 1e-5
     np.testing.assert_allclose(whole - both, 2.0 * (half - both), rtol=2e-3)
+
+
+def two_slip_at_once(force):
+    """What is left at 1/2 of the bounds of two points, 4.905 N each, that share the friction along their line."""
+    across = np.array([0.9, 0.1]) * 0.435 * force
+    return np.sqrt(4.905**2 / 4 - across**2).sum() - 0.9 * force
+
+
+def least_power(points, N, at, way):
+    """The force at which a motion begins: of all motions the least power of friction 1/2, over that of a unit force."""
+
+    def share(motion):
+        v = motion[:2] + motion[2] * np.column_stack([-points[:, 1], points[:, 0]])
+        power = (motion[:2] + motion[2] * np.array([-at[1], at[0]])) @ way[:2]
+        return 0.5 * (N * np.hypot(*v.T)).sum() / abs(power)
+
+    starts = itertools.product((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), (1.0,))
+    found = [minimize(share, x, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-15}).fun for x in starts]
+    return min(found)
+
+
+LEGS = np.array([(0.5, 0.3), (-0.5, 0.1), (0.3, -0.3)])
+LOADS = 9.81 * np.linalg.solve([[1, 1, 1], *LEGS.T], [1, 0, 0])
+PULLS = (
+    (((0.5, 0), (-0.5, 0)), (0.5, 0), (0.6, 0.8), lambda: 4.905 / 2 / 0.8),  # one end slips, about the other
+    (((0.5, 0), (-0.5, 0)), (0.4, 0), (0.9, 0.435), lambda: brentq(two_slip_at_once, 4.0, 5.0, xtol=1e-14)),
+    (LEGS, (0.5, 0.3), (0.3, 0.95), lambda: least_power(LEGS, LOADS, (0.5, 0.3), (0.3, 0.95))),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("points", "at", "way", "force"), PULLS, ids=["end", "beside the end", "three legs"])
+def test_a_body_that_is_pulled_aside_sticks_as_long_as_friction_can_hold_it(points, at, way, force):
+    """Friction in proportion to its bounds would reach one of them sooner: others take over what they can."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    body = scene.add_body(1.0, (0.1, 0.1, 0.1))
+    law = {"normal_b": Z, "unilateral": True, "kinetic": 0.5}
+    contacts = [scene.add(C.PlaneContact(body, scene.ground, point_a=(*point, 0), **law)) for point in points]
+    scene.add(ts.forces.PointForce(body, point_a=(*at, 0), force=lambda t: np.array([*way, 0.0]) * t))
+    begin = force()
+    solution = ts.simulate(scene, (0, 1.02 * begin))
+    np.testing.assert_allclose(solution.phases[0][1], begin, rtol=1e-10)
+    resting = solution.t < solution.phases[0][1]
+    assert all(solution.sticking(contact)[resting].all() for contact in contacts)
+    assert not all(solution.sticking(contact)[~resting][1:].any() for contact in contacts)
+    for contact in contacts:
+        load, friction = solution.reaction(contact)[0][:, 2], solution.reaction(contact)[0][:, :2]
+        assert (np.linalg.norm(friction, axis=1) <= 0.5 * load * (1 + 1e-9)).all()
+
+
+def test_a_wall_without_friction_braces_a_rod_that_sticks():
+    """Pushed at its end, the rod turns about the wall: one end holds half of the force, the other one pulls as much."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    rod = scene.add_body(1.0, (0.1, 0.1, 0.1))
+    law = {"normal_b": Z, "unilateral": True, "kinetic": 0.5}
+    ends = [scene.add(C.PlaneContact(rod, scene.ground, point_a=(x, 0, 0), **law)) for x in (0.5, -0.5)]
+    wall = scene.add(C.PlaneContact(rod, scene.ground, normal_b=(0, -1, 0), unilateral=True))
+    scene.add(ts.forces.PointForce(rod, point_a=(0.5, 0, 0), force=lambda t: np.array([0.0, t, 0.0])))
+    solution = ts.simulate(scene, (0, 5))
+    *_, begin = (end for _, end, _ in solution.phases if end < 5)
+    assert abs(begin - 4.905) < 1e-9
+    resting = solution.t < begin
+    np.testing.assert_allclose(solution.q[resting], solution.q[:1].repeat(resting.sum(), axis=0), atol=1e-14)
+    force, friction = solution.t[resting], [solution.reaction(end)[0][resting, 1] for end in ends]
+    assert (np.abs(friction) <= 2.4525 * (1 + 1e-9)).all()
+    balance = friction[0] + friction[1] + solution.reaction(wall)[0][resting, 1] + force
+    np.testing.assert_allclose(balance, 0.0, atol=1e-12)
+    assert abs(solution.angular_velocity(rod)[-1, 2]) > 1e-3

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import tsdyn as ts
 from tsdyn.simulation.tolerances import PENETRATION
@@ -57,3 +58,46 @@ def test_an_edge_with_one_contact_at_its_middle_leaves_bricks_in_their_plane(kin
         np.testing.assert_allclose(solution.position(name)[:, 1], 0.0, atol=1e-12)
         np.testing.assert_allclose(solution.angular_velocity(name)[:, [0, 2]], 0.0, atol=1e-8)
     assert solution.angular_velocity("low")[-1, 1] > 1.0  # it tips
+
+
+def plate(speed, kinetic):
+    """A plate on its corners, and a mass that slides along it, at first where the edge x = 1 m carries both alone."""
+    scene = ts.Scene(gravity=(0, 0, -9.81))
+    plate = scene.add_body(1.0, (0.1, 0.4, 0.5), name="plate")
+    slider = scene.add_body(1.0, (1e-3, 1e-3, 1e-3), position=(2, 0, 0), velocity=(speed, 0, 0), name="slider")
+    scene.add(C.Translational.at(plate, slider, point=(0, 0, 0), axis=(1, 0, 0)))
+    law = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": kinetic}
+    for x in (1, -1):
+        for y in (0.5, -0.5):
+            scene.add(C.PlaneContact(plate, scene.ground, point_a=(x, y, 0), name=f"{x} {y}", **law))
+    return scene
+
+
+def tipping(t, x):
+    """Angle and place of the mass on a plate that turns about its edge, with the rates; place from the edge, m."""
+    angle, s, rate, v = x
+    inertia = 0.4 + 1e-3 + 1.0 + s * s
+    turn = (9.81 * (s - 1.0) * np.cos(angle) - 2.0 * s * v * rate) / inertia
+    return rate, v, turn, s * rate**2 + 9.81 * np.sin(angle)
+
+
+@pytest.mark.parametrize("kinetic", [0.5, 0.0])
+@pytest.mark.parametrize("start", [0.0, 100.0])
+@pytest.mark.parametrize("speed", [1.0, 50.0])
+def test_corners_whose_reactions_begin_at_zero_and_fall_open_at_once(start, kinetic, speed):
+    """The friction at the edge holds it: the horizontal loads are those of the mass alone."""
+    end = start + 0.2 / speed
+    solution = ts.simulate(plate(speed, kinetic), (start, end), rtol=1e-12, atol=1e-12)
+    assert solution.phases == [(start, end, ("1 0.5", "1 -0.5"))]
+    if kinetic:
+        given = solve_ivp(tipping, (start, end), (0.0, 1.0, 0.0, speed), rtol=1e-12, atol=1e-14, method="DOP853")
+        normal = solution.position("plate", point=(0, 0, 1)) - solution.position("plate")
+        np.testing.assert_allclose(normal[-1, 0], np.sin(given.y[0, -1]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("kinetic", [0.5, 0.0])
+def test_corners_whose_reactions_begin_at_zero_and_rise_stay(kinetic):
+    solution = ts.simulate(plate(-1.0, kinetic), (0, 0.5))
+    assert solution.phases == [(0.0, 0.5, ("1 0.5", "1 -0.5", "-1 0.5", "-1 -0.5"))]
+    loads = [solution.reaction(f"-1 {y}")[0][:, 2] for y in (0.5, -0.5)]
+    np.testing.assert_allclose(sum(loads), 9.81 / 2 * solution.t, rtol=1e-9, atol=1e-9)

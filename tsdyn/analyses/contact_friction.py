@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..maths.central_path import deepest
+from ..maths.central_path import MARGIN, deepest, inwards
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
@@ -304,7 +304,8 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
     p, mode, mu = cones.solve(G, b)
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
     _demand_unique(G, d, mu, mode)
-    gdd = c + inertia.J @ (response @ p)
+    push = response @ p
+    gdd = c + inertia.J @ push
     small, carried = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)), inertia.carried()
     mode = _sharing(G, b, p, mode, cones, gaps.levers(inertia.q)[:, None] * response)
     moves, sizes = ((A @ x + y).reshape(-1, 3)[:, 1:] for A, x, y in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
@@ -342,7 +343,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
     slack = slack_of(inertia, closed, pushes, small)
     gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
     rows = _independent(inertia, closed, grips)
-    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains, begun, cones.slow)
+    found = ContactState(closed, sorted(idle + spare), gdd, push, grips, rows, slack, gains, begun, cones.slow)
     return found, bool((pushes < -rounding).any())
 
 
@@ -551,8 +552,17 @@ def _in_proportion(bounds, slips, p):
     """The same reactions p (c, 3) with friction in proportion to its bounds (c,) where rows depend.
 
     slips (c, 2, n): accelerations by unit friction. The least sum of |T|^2 / (mu N) with the same accelerations: a box
-    on a plane that doesn't turn has T / (mu N) alike at all corners.
+    on a plane that doesn't turn has T / (mu N) alike at all corners. Where one comes near its bound before the others,
+    as at the corner at which a box is pulled, these take over what they can.
     """
     weight, rows = np.repeat(np.sqrt(np.maximum(bounds, 0.0)), 2), slips.reshape(2 * len(p), -1)
     T = weight * least_squares((weight[:, None] * rows).T, p[:, 1:].ravel() @ rows, RANK_TOL)
+    some = np.repeat(bounds > RANK_TOL * bounds.max(), 2)
+    share = np.column_stack([np.ones(some.sum() // 2), (T[some] / weight[some] ** 2).reshape(-1, 2)])  # of the bounds
+    size = np.hypot(*share[:, 1:].T)
+    if size.max(initial=0.0) > 1.0 - MARGIN and np.ptp(size) > EVENT_ERROR:
+        ways = null_space(rows[some].T, RANK_TOL)
+        across = np.reshape(ways / weight[some, None] ** 2, (len(share), 2, ways.shape[1]))
+        shares = np.insert(across, 0, 0.0, axis=1).reshape(share.size, ways.shape[1])
+        T[some] += ways @ inwards(share.ravel(), shares, MARGIN)
     return np.column_stack([p[:, 0], T.reshape(-1, 2)])

@@ -182,8 +182,12 @@ class Gaps:
         return self.sign[which, None] * self.workspace.rows(t, q, np.array(which))[0]
 
     def responses(self, t, q, memory, which):
-        """Accelerations (k, 3, n) by unit reactions of these gaps, normal and along both slips, with all gaps open."""
-        rows = np.concatenate([self.normals(t, q, which)[:, None], self.slopes(t, q, which)], axis=1)
+        """Accelerations (k, 3, n) by unit reactions of these gaps, normal and along both slips, with all gaps open.
+
+        Those without friction have no slips, and their reactions the unit of those with friction.
+        """
+        slopes = np.where(self.rough[which][:, None, None], self.slopes(t, q, which), 0.0)
+        rows = np.concatenate([self.normals(t, q, which)[:, None], slopes], axis=1)
         return self.workspace.respond(t, q, memory, rows.reshape(3 * len(which), -1)).reshape(len(which), 3, -1)
 
     def biases(self, gamma):
@@ -311,6 +315,10 @@ class Inertia:
         _, gamma = self._open(qd)
         return np.column_stack([self.gaps.sign * gamma[: self.gaps.count], self.gaps.biases(gamma)])
 
+    def motion(self, qd, push):
+        """Accelerations (n,) of the bodies, by those that reactions cause, `push` (n,)."""
+        return self._open(qd)[0] + push
+
     def _open(self, qd):
         """Accelerations (n,) where all gaps are open, and gamma of the rows of all contacts."""
         qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
@@ -376,6 +384,7 @@ class ContactState(NamedTuple):
     closed: list  # of gaps: independent rows, with reactions
     idle: list  # those that stay closed by themselves, as a fourth leg does
     accelerations: np.ndarray  # (count,) of all gaps
+    push: np.ndarray | float  # (n,) accelerations by reactions
     grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
     rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
     slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
@@ -402,7 +411,7 @@ def solve_contacts(inertia, resting, qd, fired=()):
     """
     c, terms = inertia.accelerations(qd)
     if not resting:
-        return ContactState([], [], c)
+        return ContactState([], [], c, 0.0)
     resting, fired, carried = list(resting), [i for i in fired if i in resting], inertia.carried()
     while True:
         lam, basic = _solved(inertia, resting, c[resting])
@@ -425,7 +434,8 @@ def solve_contacts(inertia, resting, qd, fired=()):
         else:
             closed.append(i)
     pushes = lam[basic] if len(closed) == basic.sum() else inertia.hold(closed, c[closed])
-    return ContactState(sorted(closed), idle, gdd, slack=slack_of(inertia, closed, pushes, small))
+    push = inertia.pushed(resting, lam)
+    return ContactState(sorted(closed), idle, gdd, push, slack=slack_of(inertia, closed, pushes, small))
 
 
 def slack_of(inertia, closed, pushes, small):

@@ -116,15 +116,24 @@ def deepest(mu, p, ways):
     across = ways.reshape(-1, 3, k)[:, 1:].reshape(-1, k)
     least = least - ways @ least_squares(across, least.reshape(-1, 3)[:, 1:].ravel(), RANK_TOL)
     scale = np.column_stack([np.ones(len(p)), 1.0 / mu, 1.0 / mu]).ravel()
-    some = np.repeat(np.abs(ways).reshape(-1, 3 * k).max(axis=1) > RANK_TOL, 3)
-    B = np.column_stack([ways, np.tile([-1.0, 0.0, 0.0], len(p))])[some] * scale[some, None]
-    start = (scale * least)[some]
-    most, margin = MARGIN * np.abs(least).max(), (start[::3] - np.hypot(start[1::3], start[2::3])).min()
+    y = inwards(scale * least, scale[:, None] * ways, MARGIN * np.abs(least).max())
+    return size * (least + ways @ y).reshape(-1, 3)
+
+
+def inwards(u, ways, most):
+    """Shares y (k,) with which u + ways y are as deep in their cones |T| < N as they can; u (3 c,), ways (3 c, k).
+
+    They are zero where u are as deep as `most`.
+    """
+    k = ways.shape[1]
+    some = np.repeat(np.abs(ways).reshape(u.size // 3, 3 * k).max(axis=1, initial=0.0) > RANK_TOL, 3)
+    start, B = u[some], np.column_stack([ways, np.tile([-1.0, 0.0, 0.0], u.size // 3)])[some]
+    margin = (start[::3] - np.hypot(start[1::3], start[2::3])).min(initial=most)
     if margin >= most:
-        return size * least.reshape(-1, 3)
+        return np.zeros(k)
     y, n = np.append(np.zeros(k), margin - 1.0), k + 1
-    before, u, work, H = np.empty(n), np.empty(start.size), np.empty((3, n)), np.empty((n, n))
-    follow(B, start, most, y, before, u, work, H, np.empty(n, np.int64))
+    before, scratch, work, H = np.empty(n), np.empty(start.size), np.empty((3, n)), np.empty((n, n))
+    follow(B, start, most, y, before, scratch, work, H, np.empty(n, np.int64))
     end = (y + (y - before) / (FACTOR - 1.0))[:k]
     part = min(2.0 * (1.0 - margin / most), 1.0)  # of the way: points are continuous
-    return size * (least + part * (ways @ end)).reshape(-1, 3)
+    return part * end

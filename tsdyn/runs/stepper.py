@@ -350,8 +350,8 @@ def _keep_start(c, r, implicit):
     copy(r.x, r.x_old)
     copy(r.y, r.y_old)
     copy(r.yd, r.yd_old)
-    if implicit:
-        keep(c, r.warm)  # a stage that fails may leave u far away
+    if implicit or c.work.B.size > 0:
+        keep(c, r.warm)  # what is rejected may leave u far away, with B on another branch of the constraints
     if r.numbers.adaptive == 1 or r.numbers.first_order != 0:
         copy(r.xd, r.xd_old)
     if r.numbers.adaptive == 1:
@@ -461,6 +461,8 @@ def _change_chart(context, c, r, log, shorter, status, driven):
     r.numbers.rejected += 1
     # The chart is new: the step was too long. A fixed step has no other length
     if r.numbers.in_chart == 0:
+        if c.work.B.size > 0:
+            bring_back(c, r.warm)
         if r.numbers.adaptive == 0:
             near = is_singular_within_a_step(c.tangent) or (status in OFF_CHART and has_hardly_turned(c))
             return PASSAGE if near and r.numbers.may_pass == 1 else status
@@ -558,6 +560,8 @@ def advance(context, run, log, most):
             if t0 + r.clock.h >= t1:  # rounding would propose the same step for ever
                 r.clock.h = limits.SHRINK * h
             _go_back(r)
+            if r.numbers.in_chart == 0 and c.work.B.size > 0:  # that may have been far too long
+                bring_back(c, r.warm)
             continue
         # Accepted. A step cut short by a stop doesn't predict the next one
         note_accepted(r, log)

@@ -81,6 +81,7 @@ class Reactions(KernelFunctions):
         self.normal = np.array([first[id(gap_row(gaps, modes, i))] for i in self.closed], int)
         self.slip = np.array([slip_columns(gaps.list[i], first) for i in self.sticks], int).reshape(-1, 2)
         self.which = np.array([self.closed.index(i) for i in self.sticks], int)
+        self.smooth = np.flatnonzero(~gaps.rough[self.closed])
         self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
         self.shares = False  # whether dependent rows share friction, which the kernel doesn't know of
         # Rows of gaps that are redundant have no reaction; where there is friction they have an unknown one
@@ -118,10 +119,12 @@ class Reactions(KernelFunctions):
             self.shares = True
         lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
         N = -self.gaps.sign[self.closed] * lam[:, self.normal]
-        held = N[:, self.which]
+        held, smooth = N[:, self.which], (np.array(self.closed)[self.smooth].tolist(), N[:, self.smooth])
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
         memory = np.tile(states.memory, (states.t.size, 1))
-        N[:, self.which], T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
+        N[:, self.which], T, N[:, self.smooth] = carried(
+            self.gaps, self.sticks, states.t, states.q, memory, held, T, *smooth
+        )
         N = N + self.slack
         return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
 

@@ -89,18 +89,27 @@ def slip_columns(gap, first):
     return [first.get(id(part), -1) for part in gap.parts[1:]]
 
 
-def carried(gaps, which, t, q, memory, N, T):
-    """N (k, c) and friction (k, c, 2) of contacts that stick, where rows depend on others.
+def carried(gaps, which, t, q, memory, N, T, smooth, M):
+    """N (k, c) and friction (k, c, 2) of contacts that stick, where rows depend on others; M (k, d) of those `smooth`.
 
-    Friction is shared in proportion to N, but where reactions brace each other, see `shared`.
+    Friction is shared in proportion to N, but where reactions brace each other, see `shared`. Contacts without friction
+    brace others where these alone don't hold.
     """
-    N, T = N.copy(), T.copy()
+    N, T, M = N.copy(), T.copy(), M.copy()
     depend = np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)  # at singular configurations N is NaN, too
+    c, static = len(which), np.append(gaps.static[which], np.ones(len(smooth)))
     for k in depend.nonzero()[0]:
-        loads = gaps.responses(t[k], q[k], memory[k], which) * gaps.levers(q[k])
-        p = shared(gaps.static[which], loads.reshape(3 * len(which), -1), np.column_stack([N[k], np.nan_to_num(T[k])]))
-        N[k], T[k] = p[:, 0], p[:, 1:]
-    return N, T
+        loads = (gaps.responses(t[k], q[k], memory[k], [*which, *smooth]) * gaps.levers(q[k])).reshape(-1, q.shape[1])
+        p = shared(static[:c], loads[: 3 * c], np.column_stack([N[k], np.nan_to_num(T[k])]))
+        if smooth and (np.hypot(*p[:, 1:].T) > (1.0 + EVENT_ERROR) * static[:c] * p[:, 0]).any():
+            sizes = np.linalg.norm(loads, axis=1)[::3]
+            unit = sizes[c:] / sizes[:c].max()  # reactions of stops are torques
+            loads[3 * c :: 3] /= unit[:, None]
+            given = np.vstack([p, np.outer(M[k] * unit, (1.0, 0.0, 0.0))])
+            p = shared(static, loads, given)
+            M[k] = p[c:, 0] / unit
+        N[k], T[k] = p[:c, 0], p[:c, 1:]
+    return N, T, M
 
 
 def losses(gaps, which, lam, t, q, qd):
@@ -122,6 +131,8 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
     N = np.array([-gaps.sign[i] * lam[:, first[id(gap_row(gaps, modes, i))]] for i in frictional]).T
     tangents = np.array([gaps.slopes(*pair, frictional) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
     rows = gaps.slip_rows[frictional]
+    smooth = [i for i in modes.closed if not gaps.rough[i]]
+    M = -gaps.sign[smooth] * lam[:, [first[id(gap_row(gaps, modes, i))] for i in smooth]]
     sticks = [j for j, i in enumerate(frictional) if modes.sticks(i)]
     if sticks:
         T = -out[:, rows[sticks]]
@@ -129,20 +140,21 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
             T[:, j, [k for k, held in enumerate(modes.grips[frictional[i]]) if not held]] = np.nan
         redundant, alone = np.isnan(T), np.nan_to_num(T)
         own = N[:, sticks]
-        N[:, sticks], T = carried(gaps, [frictional[j] for j in sticks], t, q, memory, own, T)
+        braced = [frictional[j] for j in sticks], t, q, memory, own, T, smooth, M
+        N[:, sticks], T, others = carried(gaps, *braced)
         if redundant.any():
             # M qdd + Phi_q^T (lam + change) = Q + J^T T    J: redundant slips
             f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
-            more = N[:, sticks] - own
+            more = np.hstack([N[:, sticks] - own, others - M])
             if more.any():
-                which = [frictional[j] for j in sticks]
+                which = [*(frictional[j] for j in sticks), *smooth]
                 normals = np.array([gaps.normals(*pair, which) for pair in zip(t, q, strict=True)])
                 f = np.einsum("kc,kcn->kn", more, normals) + np.einsum("kci,kcin->kn", T - alone, tangents[:, sticks])
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
-            pushing = [first[id(gap_row(gaps, modes, i))] for i in frictional]
+            pushing = [first[id(gap_row(gaps, modes, i))] for i in (*frictional, *smooth)]
             moves = np.abs(change[:, pushing]).max(axis=1) > EVENT_ERROR * np.abs(N).max(axis=1)
-            change[moves], T[moves] = 0.0, alone[moves]
+            change[moves], T[moves], others[moves] = 0.0, alone[moves], M[moves]
             for j, i in enumerate(sticks):
                 N[moves, i] = own[moves, j]
             out[:, shared[0]] += change[:, shared[1]]
@@ -150,6 +162,8 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
         if (N[:, sticks] != own).any():
             which = [frictional[j] for j in sticks]
             out[:, gaps.rows[which]] = -gaps.sign[which] * N[:, sticks]
+        if (others != M).any():
+            out[:, gaps.rows[smooth]] = -gaps.sign[smooth] * others
     slip = np.einsum("kcin,kn->kci", tangents, qd)
     for j, i in enumerate(frictional):
         if modes.slides(i):

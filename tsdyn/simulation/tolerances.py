@@ -70,9 +70,9 @@ FLIGHT = 1e-12
 # The same of flights that impacts of other contacts end, and the rate of their end over that of a free flight: contacts
 # are as good as closed then. Their impacts would go on down to FLIGHT, each contact through all flights.
 ACCUMULATED, PUSHED = 1e-10, 1.01
-# Of the time since a phase began: so much earlier than an opening, what presses contacts together has still done so.
-# Accelerations over LEVEL that are more than rounding then.
-EARLIER, PRESSED = 1e-7, 10.0
+# Of the time in which accelerations move a body along the scene's length: reactions that begin as rounding of zero have
+# risen or fallen so much later. Accelerations over LEVEL that are more than rounding then.
+LATER, PRESSED = 1e-5, 10.0
 # Roundings in a gap, of the sizes of its terms: gaps that are lifted by less have not opened.
 ROUNDED = 16.0
 # Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from ..analyses.contact_friction import Cones, at_turn, solve_rough_contacts
+from ..analyses.contact_friction import Cones, at_turn, halted, solve_rough_contacts
 from ..analyses.contact_problem import Inertia, NoSolution, solve_contacts
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, gradients, values_of
 from ..analyses.tolerances import EVENT_ERROR, LEVEL, PIVOTS, RESTS, STOPPED
@@ -27,7 +27,7 @@ from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
 from .scene_cache import prepared
-from .tolerances import ACCUMULATED, CREEPING, EARLIER, EVENTS_JUDGED, FLIGHT, MOST_AT_AN_INSTANT, PRESSED, ROUNDED
+from .tolerances import ACCUMULATED, CREEPING, EVENTS_JUDGED, FLIGHT, LATER, MOST_AT_AN_INSTANT, PRESSED, ROUNDED
 
 
 def contact_state(inertia, resting, qd, fired=()):
@@ -158,11 +158,10 @@ class Transitions:
                 return struck, solve_contacts(inertia, resting, struck, leaving)
 
             self.qd, contacts = settled(leaving)
-            while struck is qd and (unloaded := self._unloaded(inertia, contacts, leaving, before)):
+            if unloaded := self._unloaded(inertia, contacts, resting, leaving):
                 found = settled([*leaving, *unloaded])
-                if {*found[1].closed, *found[1].idle}.intersection(unloaded):  # others press them now
-                    break
-                leaving, (self.qd, contacts) = [*leaving, *unloaded], found
+                if not {*found[1].closed, *found[1].idle}.intersection(unloaded):
+                    leaving, (self.qd, contacts) = [*leaving, *unloaded], found
             if rough:
                 if self.qd is not struck and np.array_equal(struck, self.ended):
                     self.rest = self.t + stopping_time(inertia, resting, struck, self.qd, self.qdd, contacts.slow)
@@ -190,29 +189,30 @@ class Transitions:
                 )
             return Status.CONTACT_FAILED
 
-    def _unloaded(self, inertia, contacts, leaving, before):
-        """Closed gaps without reactions that leave with those `leaving`: what has pressed them has just vanished.
+    def _unloaded(self, inertia, contacts, resting, leaving):
+        """Gaps without reactions that open at once, though at this instant they have no acceleration.
 
-        Where reactions aren't unique, two of four corners may carry a body. The others have had no reaction that could
-        vanish; when those of the two do, nothing presses them, either. A little earlier it did: accelerations go
-        through zero.
+        Reactions that are rounding of zero rise or fall: which of them do follows from the complementarity problem a
+        little later. Where two of four corners have carried a body, the others have had no reaction that could vanish;
+        when those of the two do, nothing presses them, either.
         """
-        known, fell = {*before.closed, *before.idle}.difference(leaving), [i for i in leaving if i in before.closed]
-        which = [i for i in contacts.slack if i in known]
-        if not (which and fell and self.phases.starts):
+        kept = [i for i in resting if i not in leaving]
+        most = inertia.accelerations(self.qd)[1].max()
+        if not contacts.slack or most == 0.0:
             return []
-        dt, slots = EARLIER * (self.t - self.phases.starts[-1]), self.remembered[self.count :]
-        q, qd = self.q - dt * self.qd, self.qd - dt * self.qdd
-        carrying = [i for i in contacts.closed if i not in contacts.slack]
-        earlier = Inertia(self.gaps, self.t - dt, q, slots, inertia.which.tolist(), carrying)
+        dt, slots = LATER * np.sqrt(self.length / most), self.remembered[self.count :]
+        q, qd = self.q + dt * self.qd, self.qd + dt * inertia.motion(self.qd, contacts.push)
+        later = Inertia(self.gaps, self.t + dt, q, slots, inertia.which.tolist(), contacts.closed)
+        sticks = [i for i in contacts.closed if contacts.grips.get(i, ()) is None]
         try:
-            pressed = contact_state(earlier, carrying, qd).accelerations
-            least = PRESSED * LEVEL * earlier.accelerations(qd)[1]
+            qd = halted(later, qd, contacts.closed, sticks)[0]
+            found, least = contact_state(later, kept, qd), PRESSED * LEVEL * later.accelerations(qd)[1]
         except NoSolution:
             return []
         finally:
             inertia.free(inertia.J[:0].T)  # the factors are those of the present state again
-        return [i for i in which if pressed[i] < -least[i]]
+        stays, light = {*found.closed, *found.idle}, {*contacts.slack, *contacts.idle}
+        return [i for i in kept if i in light and i not in stays and found.accelerations[i] > least[i]]
 
     def _open(self, inertia, which, rates, a):
         """Open the gaps `which`, with these rates and decelerations a (count,).

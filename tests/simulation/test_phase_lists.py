@@ -1,4 +1,4 @@
-"""Phases and impulses of a run as lists and tables; outputs where a phase at rest begins."""
+"""Phases and impulses of a run as lists and tables."""
 
 import pickle
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.contacts import bouncing
 
 C = ts.constraints
 
@@ -37,15 +36,3 @@ def test_phases_and_impulses_say_what_sticks_and_print_as_tables(tmp_path):
     loaded = ts.load(solution.save(tmp_path / "run.h5"))
     assert str(loaded.phases) == str(solution.phases)
     assert pickle.loads(pickle.dumps(solution.phases))[-1].sticking == last.sticking
-
-
-@pytest.mark.parametrize("method", [None, "dop853"])
-def test_outputs_have_the_instant_from_which_a_ball_is_at_rest(method):
-    scene, fall = bouncing(0.5)
-    rests = 3.0 * fall
-    solution = ts.simulate(scene, (0, 4.0), integrator=method, rtol=1e-10, atol=1e-10)
-    assert solution.phases[-1].start in solution.t
-    assert abs(solution.phases[-1].start - rests) < 1e-9
-    assert all(phase.start in solution.t for phase in solution.phases)
-    asked = ts.simulate(scene, (0, 4.0), integrator=method, t_eval=[0.0, 4.0])
-    assert asked.t.tolist() == [0.0, 4.0]

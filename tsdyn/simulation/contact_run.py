@@ -29,7 +29,6 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS, NEGLIGIBLE
 from ..model.handles import handles_of
-from ..motions.tolerances import TOGETHER
 from ..observables import diagnostics
 from ..observables.reactions import singular_place
 from ..observables.state import remembered
@@ -267,7 +266,7 @@ class _ContactRun(Transitions, Checkpoints):
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), resume=self, archive=self.archive, stops=self._stops(task.stops),
+                max_steps=self._steps_left(), resume=self, archive=self.archive,
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
@@ -339,14 +338,6 @@ class _ContactRun(Transitions, Checkpoints):
             archive.shift, archive.skips, archive.passed = 0.0, False, []
             self.written = dict(archive.counts)
             archive.look_up(lambda: ({"t": self.t, "between": True}, {}))
-
-    def _stops(self, stops):
-        """The stops of a phase, with the end of flights that are none: outputs of every step have that instant."""
-        near = TOGETHER * max(map(abs, self.span))
-        known = np.append(stops[:, 0], (self.t, self.span[1]))
-        if not self.per_step or not self.t < self.rest < self.span[1] or np.abs(known - self.rest).min() <= near:
-            return stops
-        return np.insert(stops, np.searchsorted(stops[:, 0], self.rest), (self.rest, 0.0, self.rest), axis=0)
 
     def _sampling(self, kept):
         """The sampled loads of a phase, which go on from those of the one before."""

@@ -115,6 +115,7 @@ class Cones:
         for i, d in ways.items():
             self.d[resting.index(i)] = d
         self.rough, self.kinetic, self.static = (x[resting] for x in (gaps.rough, gaps.kinetic, gaps.static))
+        self.broken = np.isin(resting, inertia.broken)
 
     def solve(self, G, b, bounds=()):
         """Reactions p (3 k,), modes and coefficients (k,), where accelerations are G p + b; raises NoSolution.
@@ -154,8 +155,9 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     """
     kept = None
     for by_rows in False, True:
-        found, pulls = _solve(inertia, resting, qd, fired, by_rows)
-        if found.idle and (alone := _alone(inertia, found, qd, fired)):
+        found, pulls, moves_so = _solve(inertia, resting, qd, fired, by_rows)
+        carries = found.spread and moves_so
+        if found.idle and not carries and (alone := _alone(inertia, found, qd, fired)):
             return alone
         if not pulls:
             kept = kept or found
@@ -175,7 +177,7 @@ def _alone(inertia, found, qd, fired):
     while which not in seen:
         seen.append(which)
         try:
-            again, pulls = _solve(inertia, which, qd, fired)
+            again, pulls, _ = _solve(inertia, which, qd, fired)
         except NoSolution:
             return None
         left = {*found.closed, *found.idle}.difference(again.closed, again.idle)
@@ -291,7 +293,9 @@ def _pair(gaps, i):
 
 
 def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})):
-    """As `solve_rough_contacts`, with the normal loads shared among all contacts; and whether a closed one pulls.
+    """As `solve_rough_contacts`, with the normal loads shared among all contacts; whether a closed one pulls.
+
+    And whether the bodies move so where idle contacts carry nothing, as in the phase.
 
     by_rows: closed contacts are chosen by what holds their rows, instead of by the same accelerations.
     ways: of `Cones`.
@@ -338,12 +342,18 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
         closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone, fired), []
     else:
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
-    pushes, rounding = _held(inertia, closed, grips, alone, small + carried)
+    (pushes, *T), rounding, moved = _held(inertia, closed, grips, alone, small + carried)
+    idle, rows, spread = sorted(idle + spare), _independent(inertia, closed, grips), {}
+    pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
+    bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
+    if pulls or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
+        spread, shares = _spread(inertia, closed, idle, grips, alone, rows)
+        pushes, pulls = (shares, False) if spread else (pushes, pulls)
     slack = slack_of(inertia, closed, pushes, small)
     gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
-    rows = _independent(inertia, closed, grips)
-    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains, begun, cones.slow)
-    return found, bool((pushes < -rounding).any())
+    found = ContactState(closed, idle, gdd, grips, rows, slack, gains, begun, cones.slow, spread)
+    change = np.abs(cones.rows @ (moved - response @ p)).reshape(-1, 3).max(axis=1, initial=0.0)
+    return found, pulls, not (change > EVENT_ERROR * sizes.max(axis=1)).any()
 
 
 def _sharing(G, b, p, mode, cones, response):
@@ -357,7 +367,8 @@ def _sharing(G, b, p, mode, cones, response):
         return mode
     loads = response.T[np.repeat(still, 3)]
     N, *T = shared(cones.static[still], loads, p.reshape(-1, 3)[still]).T
-    within = np.hypot(*T) < (1.0 - EVENT_ERROR) * cones.static[still] * N
+    # Who has just reached the bound goes on to slide; others that are at it stay, as bodies that slide as one
+    within = np.hypot(*T) < (1.0 - np.where(cones.broken, 1.0, -1.0)[still] * EVENT_ERROR) * cones.static[still] * N
     return np.where(still, STICKS, mode) if within.all() else mode
 
 
@@ -423,7 +434,7 @@ def _pushing(inertia, which, grips, b, fired):
 
     With dependent rows loads of contacts that slide may be independent: other ones give other accelerations.
     """
-    A, a = _holding(inertia, which, grips, b)
+    A, a, _ = _holding(inertia, which, grips, b)
     return _basis(inertia, which, np.hstack([A, -A[:, len(which) :]]), -a, fired)
 
 
@@ -497,34 +508,81 @@ def _loads(inertia, which, ways):
 
 
 def _held(inertia, closed, grips, b, small):
-    """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations; their rounding.
+    """Reactions (3, k) of closed gaps where they and slips of those that stick have no accelerations; rounding (k,).
+
+    And the accelerations (n,) of all coordinates by these.
 
     b: accelerations (3,) of gaps and slips where all are open, by gaps; small (count,): rounding of accelerations of
     gaps. Reactions may fall below zero by twice their rounding: by the error of reactions at an event. Largest
     reactions are those, or what one contact alone would carry of the terms: in free fall all reactions are rounding.
     """
-    (A, a), k = _holding(inertia, closed, grips, b), len(closed)
+    (A, a, response), k = _holding(inertia, closed, grips, b), len(closed)
     by = least_squares(A, np.eye(len(A)), RANK_TOL**2)
-    p, by = -by @ a, by[:k]
-    pushes, sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
+    p, by, found = -by @ a, by[:k], np.zeros((k, 3))
+    found[:, 0], sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
         loads = inertia.free(rows_of(inertia, sticks).T).T * inertia.gaps.levers(inertia.q)
-        pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
+        found[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([found[at, 0], slips]))
+    pushes = found[:, 0]
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
-    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
+    limits = np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
+    return found.T, limits, response @ p
+
+
+def _spread(inertia, closed, idle, grips, b, rows):
+    """What reactions have beside those of the rows of a phase, so that all are within their bounds; and all of closed.
+
+    The rows of a phase are independent: where contacts depend on each other, some carry nothing, and a few what all of
+    them could. A self-stress of all closed and idle ones, which accelerates nothing, takes them as deep into their
+    cones as they can be, see `deepest`; it stays as it is in the phase. Friction of those that slide goes with their
+    normal reactions. At the bound, to the error of events, friction still holds.
+
+    Returns
+    -------
+    spread : dict
+        Numbers (4,) of each: normal reaction, friction along both slips, and what its friction may exceed the bound by;
+        empty where no reactions are within their bounds.
+    pushes : ndarray (k,)
+    """
+    (A, a, _), k, which, gaps = _holding(inertia, closed, grips, b), len(closed), [*closed, *idle], inertia.gaps
+    sticks = np.array([gaps.rough[i] and grips[i] is None for i in which])
+    kept = np.concatenate([np.ones(k, bool), *(np.array(rows[i], bool) for i in closed if i in rows)])
+    x, p = np.zeros((len(which), 3)), np.zeros(kept.size)
+    p[kept] = -least_squares(A[np.ix_(kept, kept)], a[kept], RANK_TOL**2)
+    x[:k, 0], x[np.flatnonzero(sticks[:k]), 1:] = p[:k], p[k:].reshape(-1, 2)
+    loads = rows_of(inertia, which).reshape(len(which), 3, -1)
+    loads[:, 0] = _loads(inertia, which, _ways(inertia, grips))
+    loads[~sticks, 1:] = 0.0
+    loads = inertia.free(loads.reshape(x.size, -1).T).T * gaps.levers(inertia.q)
+    size = np.linalg.norm(loads, axis=1)
+    some = size > RANK_TOL * size.max(initial=0.0)
+    free = null_space(loads[some].T, RANK_TOL)
+    if not free.size:
+        return {}, x[:k, 0]
+    ways = np.zeros((x.size, free.shape[1]))
+    ways[some] = free
+    mu = np.where(sticks, gaps.static[which], 1.0)
+    found = deepest(mu, x, ways)
+    left, largest = mu * found[:, 0] - np.hypot(*found[:, 1:].T), np.abs(found).max()
+    if (np.minimum(left, found[:, 0]) < -EVENT_ERROR * largest).any():
+        return {}, x[:k, 0]
+    more = np.where(sticks & (left < EVENT_ERROR * largest), 4.0 * EVENT_ERROR * largest, 0.0)
+    return dict(zip(which, map(tuple, np.column_stack([found - x, more]).tolist()), strict=True)), found[:k, 0]
 
 
 def _holding(inertia, closed, grips, b):
-    """Accelerations of closed gaps, then of slips of those that stick, by their reactions, and where all are open."""
+    """Accelerations of closed gaps, then of slips of those that stick, by their reactions, and where all are open.
+
+    And those of all coordinates by these reactions.
+    """
     sticks = [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
     slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
     loads = np.concatenate([_loads(inertia, closed, _ways(inertia, grips)), slips])
     rows = np.concatenate([inertia.J[closed], slips])
-    return product(rows, inertia.free(loads.T)), np.array(
-        [*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])]
-    )
+    response, a = inertia.free(loads.T), [*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])]
+    return product(rows, response), np.array(a), response
 
 
 def shared(static, loads, p):

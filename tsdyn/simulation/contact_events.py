@@ -37,16 +37,17 @@ class ReactionParts(NamedTuple):
     which: np.ndarray  # int64 (sticking,)  which of the closed stick
     slip: np.ndarray  # int64 (2 sticking,)  rows of their slips; -1 of one that depends on others
     static: np.ndarray  # (sticking,)
+    spread: np.ndarray  # (3 sticking,)  friction beside that of the rows, and what is allowed beyond the bound
     lam: np.ndarray  # (m,)  scratch
 
 
 _none, _whole = np.zeros(0), np.zeros(0, int)
-load_reactions = loader(ReactionParts(ReactionNumbers(), _none, _whole, _none, _none, _whole, _whole, _none, _none))
+load_reactions = loader(ReactionParts(ReactionNumbers(), _none, _whole, _none, _none, _whole, _whole, *[_none] * 3))
 
 
 @callback(VALUES)
 def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: VALUES
-    """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique."""
+    """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique, nor spread."""
     c, x = load_parts(parts), load_reactions(own)
     closed, lam = x.normal.size, x.lam
     values = vector(out, closed + x.which.size)
@@ -56,8 +57,9 @@ def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: 
         values[i] = x.slack[i] - x.sign[i] * lam[x.normal[i]]
     for k in range(x.which.size):
         i, j = x.slip[2 * k], x.slip[2 * k + 1]
-        T = math.hypot(lam[i], lam[j]) if i >= 0 and j >= 0 else math.nan
-        values[closed + k] = x.static[k] * values[x.which[k]] - T
+        T0, T1 = lam[i] if i >= 0 else x.numbers.redundant, lam[j] if j >= 0 else x.numbers.redundant
+        T = math.hypot(T0 - x.spread[3 * k], T1 - x.spread[3 * k + 1])
+        values[closed + k] = x.static[k] * values[x.which[k]] - T + x.spread[3 * k + 2]
     return 0
 
 
@@ -81,10 +83,12 @@ class Reactions(KernelFunctions):
         self.normal = np.array([first[id(gap_row(gaps, modes, i))] for i in self.closed], int)
         self.slip = np.array([slip_columns(gaps.list[i], first) for i in self.sticks], int).reshape(-1, 2)
         self.which = np.array([self.closed.index(i) for i in self.sticks], int)
-        self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
+        none = (0.0, 0.0, 0.0, 0.0)
+        self.slack = np.array([modes.slack.get(i, 0.0) + modes.spread.get(i, none)[0] for i in modes.closed])
+        self.spread = np.array([modes.spread.get(i, none)[1:] for i in self.sticks]).reshape(-1, 3)
         self.shares = False  # whether dependent rows share friction, which the kernel doesn't know of
-        # Rows of gaps that are redundant have no reaction; where there is friction they have an unknown one
-        self.redundant = np.nan if rough else 0.0
+        # Rows of gaps that are redundant have no reaction; where there is friction they have an unknown one, or a share
+        self.redundant = np.nan if rough and not modes.spread else 0.0
 
     @cached_property
     def workspace(self):
@@ -98,7 +102,7 @@ class Reactions(KernelFunctions):
         own, *self._keep = resident(
             ReactionParts(
                 ReactionNumbers(redundant=self.redundant), memory, self.normal, self.gaps.sign[self.closed], self.slack,
-                self.which, self.slip.ravel(), self.gaps.static[self.sticks], scratch,
+                self.which, self.slip.ravel(), self.gaps.static[self.sticks], self.spread.ravel(), scratch,
             )
         )  # fmt: skip
         count = len(self.closed) + len(self.sticks)

@@ -129,8 +129,11 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
             T[:, j, [k for k, held in enumerate(modes.grips[frictional[i]]) if not held]] = np.nan
         redundant, alone = np.isnan(T), np.nan_to_num(T)
         own = N[:, sticks]
-        N[:, sticks], T = carried(gaps, [frictional[j] for j in sticks], t, q, memory, own, T)
-        if redundant.any():
+        if modes.spread:
+            T = alone
+        else:
+            N[:, sticks], T = carried(gaps, [frictional[j] for j in sticks], t, q, memory, own, T)
+        if redundant.any() and not modes.spread:
             # M qdd + Phi_q^T (lam + change) = Q + J^T T    J: redundant slips
             f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
             more = N[:, sticks] - own
@@ -150,10 +153,35 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
         if (N[:, sticks] != own).any():
             which = [frictional[j] for j in sticks]
             out[:, gaps.rows[which]] = -gaps.sign[which] * N[:, sticks]
-    slip = np.einsum("kcin,kn->kci", tangents, qd)
     for j, i in enumerate(frictional):
         if modes.slides(i):
             out[:, gaps.rows[i]] = -gaps.sign[i] * N[:, j]
-            d, v = gaps.across(i, tangents[:, j], memory[:, gaps.slots[i] :][:, :3]), slip[:, j]  # (k, 2)
-            e = twin(heading)(v[:, 0], v[:, 1], 0.0, np.column_stack([d, np.zeros(len(d))]).T, 1.0)[:2]
-            out[:, rows[j]] = (gaps.kinetic[i] * N[:, j])[:, None] * np.array(e).T
+            out[:, rows[j]] = -N[:, j, None] * _friction(gaps, i, tangents[:, j], qd, memory)
+    if modes.spread:
+        _add_spread(gaps, modes, packed, shared, t, q, qd, memory, out)
+
+
+def _friction(gaps, i, tangents, qd, memory):
+    """Friction (k, 2) along the slips (k, 2, n) of a contact that slides, for unit normal reactions."""
+    d, v = gaps.across(i, tangents, memory[:, gaps.slots[i] :][:, :3]), np.einsum("kin,kn->ki", tangents, qd)
+    e = twin(heading)(v[:, 0], v[:, 1], 0.0, np.column_stack([d, np.zeros(len(d))]).T, 1.0)[:2]
+    return -gaps.kinetic[i] * np.array(e).T
+
+
+def _add_spread(gaps, modes, packed, shared, t, q, qd, memory, out):
+    """Add the multipliers of `UnitModes.spread` to out (k, m); joints, and contacts that are closed, balance them."""
+    first, f, more = first_row_of(packed), np.zeros_like(q), np.zeros_like(out)
+    for i, (N, *T, _) in modes.spread.items():
+        f += N * np.stack([gaps.normals(*pair, [i])[0] for pair in zip(t, q, strict=True)])
+        more[:, gaps.rows[i]] = -gaps.sign[i] * N
+        if gaps.rough[i]:
+            tangents = np.stack([gaps.slopes(*pair, [i])[0] for pair in zip(t, q, strict=True)])  # (k, 2, n)
+            T = N * _friction(gaps, i, tangents, qd, memory) if modes.slides(i) else np.tile(T[:2], (t.size, 1))
+            f += np.einsum("ki,kin->kn", T, tangents)
+            more[:, gaps.slip_rows[i]] = -T
+    change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
+    more[:, shared[0]] += change[:, shared[1]]
+    for i in modes.closed:
+        if modes.slides(i):
+            more[:, gaps.rows[i]] += change[:, first[id(gap_row(gaps, modes, i))]]
+    out += np.nan_to_num(more)

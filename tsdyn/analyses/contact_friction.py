@@ -115,7 +115,7 @@ class Cones:
         for i, d in ways.items():
             self.d[resting.index(i)] = d
         self.rough, self.kinetic, self.static = (x[resting] for x in (gaps.rough, gaps.kinetic, gaps.static))
-        self.broken = np.isin(resting, inertia.broken)
+        self.broken = bool(inertia.broken)
 
     def solve(self, G, b, bounds=()):
         """Reactions p (3 k,), modes and coefficients (k,), where accelerations are G p + b; raises NoSolution.
@@ -362,13 +362,14 @@ def _sharing(G, b, p, mode, cones, response):
     Where slips depend on each other, the solution may have some at their bounds that others could relieve.
     """
     moves, terms = ((x @ y + z).reshape(-1, 3)[:, 1:] for x, y, z in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
-    still = cones.rough & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= LEVEL * terms).all(axis=1)
+    # Where one has just reached the bound it goes on to slide; those that are at it stay, as bodies that slide as one
+    level, beyond = (LEVEL, -EVENT_ERROR) if cones.broken else (EVENT_ERROR, EVENT_ERROR)
+    still = cones.rough & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= level * terms).all(axis=1)
     if (mode[still] == STICKS).all():
         return mode
     loads = response.T[np.repeat(still, 3)]
     N, *T = shared(cones.static[still], loads, p.reshape(-1, 3)[still]).T
-    # Who has just reached the bound goes on to slide; others that are at it stay, as bodies that slide as one
-    within = np.hypot(*T) < (1.0 - np.where(cones.broken, 1.0, -1.0)[still] * EVENT_ERROR) * cones.static[still] * N
+    within = np.hypot(*T) < (1.0 + beyond) * cones.static[still] * N
     return np.where(still, STICKS, mode) if within.all() else mode
 
 

@@ -342,11 +342,12 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
         closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone, fired), []
     else:
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
-    (pushes, *T), rounding, moved = _held(inertia, closed, grips, alone, small + carried)
+    (pushes, *T), rounding, moved, braced = _held(inertia, closed, grips, alone, small + carried)
     idle, rows, spread = sorted(idle + spare), _independent(inertia, closed, grips), {}
     pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
     bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
-    if pulls or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
+    braced = braced and bool(idle)
+    if pulls or braced or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
         spread, shares = _spread(inertia, closed, idle, grips, alone, rows)
         pushes, pulls = (shares, False) if spread else (pushes, pulls)
     slack = slack_of(inertia, closed, pushes, small)
@@ -519,17 +520,17 @@ def _held(inertia, closed, grips, b, small):
     """
     (A, a, response), k = _holding(inertia, closed, grips, b), len(closed)
     by = least_squares(A, np.eye(len(A)), RANK_TOL**2)
-    p, by, found = -by @ a, by[:k], np.zeros((k, 3))
+    p, by, found, braced = -by @ a, by[:k], np.zeros((k, 3)), False
     found[:, 0], sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
         loads = inertia.free(rows_of(inertia, sticks).T).T * inertia.gaps.levers(inertia.q)
-        found[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([found[at, 0], slips]))
+        found[at], braced = share(inertia.gaps.static[sticks], loads, np.column_stack([found[at, 0], slips]))
     pushes = found[:, 0]
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
     limits = np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
-    return found.T, limits, response @ p
+    return found.T, limits, response @ p, braced
 
 
 def _spread(inertia, closed, idle, grips, b, rows):
@@ -586,24 +587,29 @@ def _holding(inertia, closed, grips, b):
     return product(rows, response), np.array(a), response
 
 
-def shared(static, loads, p):
+def shared(*given):
+    """The reactions alone of `share`."""
+    return share(*given)[0]
+
+
+def share(static, loads, p):
     """The same reactions p (c, 3) of contacts that stick, shared among them: as deep in their cones as they can.
 
     loads (3 c, n): accelerations by unit reactions. Where slips depend on each other alone, friction is in proportion
     to its bounds. Where they depend on gaps, contacts brace each other, as those of a ball with floor and wall along
-    the line through both points: see `deepest`.
+    the line through both points: see `deepest`. And whether they do.
     """
     sizes, free = np.linalg.norm(loads, axis=1), np.zeros((0, 0))
     some = sizes > RANK_TOL * sizes.max(initial=0.0)  # others are held
     if p.any():
         free = null_space(loads[some].T, RANK_TOL)
     if not free.size:
-        return p
+        return p, False
     ways = np.zeros((p.size, free.shape[1]))
     ways[some] = free
     if np.abs(ways[::3]).max() <= RANK_TOL:
-        return _in_proportion(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p)
-    return deepest(static, p, ways)
+        return _in_proportion(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p), False
+    return deepest(static, p, ways), True
 
 
 def _in_proportion(bounds, slips, p):

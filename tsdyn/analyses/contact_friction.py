@@ -27,6 +27,7 @@ from .tolerances import (
     FAR,
     LEAST_SHARE,
     LEAST_SLIP,
+    LEAST_WEIGHT,
     LEVEL,
     NEAR_WAY,
     PULLS,
@@ -348,7 +349,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
     bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
     braced = braced and bool(idle)
     if pulls or braced or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
-        spread, shares = _spread(inertia, closed, idle, grips, alone, rows)
+        spread, shares = _spread(inertia, closed, idle, grips, alone)
         pushes, pulls = (shares, False) if spread else (pushes, pulls)
     slack = slack_of(inertia, closed, pushes, small)
     gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
@@ -533,45 +534,54 @@ def _held(inertia, closed, grips, b, small):
     return found.T, limits, response @ p, braced
 
 
-def _spread(inertia, closed, idle, grips, b, rows):
-    """What reactions have beside those of the rows of a phase, so that all are within their bounds; and all of closed.
+def _spread(inertia, closed, idle, grips, b):
+    """Reactions of closed and idle contacts from those of the rows of a phase, all within bounds; those of closed ones.
 
     The rows of a phase are independent: where contacts depend on each other, some carry nothing, and a few what all of
-    them could. A self-stress of all closed and idle ones, which accelerates nothing, takes them as deep into their
-    cones as they can be, see `deepest`; it stays as it is in the phase. Friction of those that slide goes with their
-    normal reactions. At the bound, to the error of events, friction still holds.
+    them could. Here all carry. At first their reactions lie as deep in their cones as they can, see `deepest`; in the
+    phase they change by the least share of their bounds. Friction of those that slide goes with their normal reactions.
+    At the bound, to the error of events, friction still holds.
 
     Returns
     -------
     spread : dict
-        Numbers (4,) of each: normal reaction, friction along both slips, and what its friction may exceed the bound by;
-        empty where no reactions are within their bounds.
+        Numbers (4 + 3 r,) of each: normal reaction, friction along both slips, and what its friction may exceed the
+        bound by; then by how much these three grow with reactions of the rows (r,), those of closed gaps first, then of
+        the slips of those that stick. Empty where no reactions are within their bounds.
     pushes : ndarray (k,)
     """
     (A, a, _), k, which, gaps = _holding(inertia, closed, grips, b), len(closed), [*closed, *idle], inertia.gaps
     sticks = np.array([gaps.rough[i] and grips[i] is None for i in which])
-    kept = np.concatenate([np.ones(k, bool), *(np.array(rows[i], bool) for i in closed if i in rows)])
-    x, p = np.zeros((len(which), 3)), np.zeros(kept.size)
-    p[kept] = -least_squares(A[np.ix_(kept, kept)], a[kept], RANK_TOL**2)
-    x[:k, 0], x[np.flatnonzero(sticks[:k]), 1:] = p[:k], p[k:].reshape(-1, 2)
+    p = -least_squares(A, a, RANK_TOL**2)
     loads = rows_of(inertia, which).reshape(len(which), 3, -1)
     loads[:, 0] = _loads(inertia, which, _ways(inertia, grips))
     loads[~sticks, 1:] = 0.0
-    loads = inertia.free(loads.reshape(x.size, -1).T).T * gaps.levers(inertia.q)
+    loads = inertia.free(loads.reshape(3 * len(which), -1).T).T * gaps.levers(inertia.q)
+    own = np.zeros((len(which), 3), bool)
+    own[:k, 0], own[:k, 1:] = True, sticks[:k, None]
+    rows = np.flatnonzero(own)
+    rows = np.concatenate([rows[rows % 3 == 0], rows[rows % 3 > 0]])
+    x = np.zeros(own.size)
+    x[rows] = p
     size = np.linalg.norm(loads, axis=1)
     some = size > RANK_TOL * size.max(initial=0.0)
     free = null_space(loads[some].T, RANK_TOL)
     if not free.size:
-        return {}, x[:k, 0]
+        return {}, p[:k]
     ways = np.zeros((x.size, free.shape[1]))
     ways[some] = free
     mu = np.where(sticks, gaps.static[which], 1.0)
-    found = deepest(mu, x, ways)
+    found = deepest(mu, x.reshape(-1, 3), ways)
     left, largest = mu * found[:, 0] - np.hypot(*found[:, 1:].T), np.abs(found).max()
     if (np.minimum(left, found[:, 0]) < -EVENT_ERROR * largest).any():
-        return {}, x[:k, 0]
+        return {}, p[:k]
     more = np.where(sticks & (left < EVENT_ERROR * largest), 4.0 * EVENT_ERROR * largest, 0.0)
-    return dict(zip(which, map(tuple, np.column_stack([found - x, more]).tolist()), strict=True)), found[:k, 0]
+    weight = np.maximum(found[:, :1], LEAST_WEIGHT * largest) * np.column_stack([np.ones(len(mu)), mu, mu])
+    weight = np.where(some, weight.ravel(), 0.0)[:, None]
+    by = weight * least_squares((weight * loads).T, loads[rows].T, RANK_TOL)
+    start = found - (by @ p).reshape(-1, 3)
+    numbers = np.column_stack([start, more, by.reshape(len(which), -1)])
+    return dict(zip(which, map(tuple, numbers.tolist()), strict=True)), found[:k, 0]
 
 
 def _holding(inertia, closed, grips, b):

@@ -158,7 +158,7 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
             out[:, gaps.rows[i]] = -gaps.sign[i] * N[:, j]
             out[:, rows[j]] = -N[:, j, None] * _friction(gaps, i, tangents[:, j], qd, memory)
     if modes.spread:
-        _add_spread(gaps, modes, packed, shared, t, q, qd, memory, out)
+        _add_shared(gaps, modes, packed, shared, t, q, qd, memory, out)
 
 
 def _friction(gaps, i, tangents, qd, memory):
@@ -168,15 +168,23 @@ def _friction(gaps, i, tangents, qd, memory):
     return -gaps.kinetic[i] * np.array(e).T
 
 
-def _add_spread(gaps, modes, packed, shared, t, q, qd, memory, out):
-    """Add the multipliers of `UnitModes.spread` to out (k, m); joints, and contacts that are closed, balance them."""
+def _add_shared(gaps, modes, packed, shared, t, q, qd, memory, out):
+    """Have contacts share their reactions in out (k, m), by `UnitModes.spread`; what else holds balances them."""
     first, f, more = first_row_of(packed), np.zeros_like(q), np.zeros_like(out)
-    for i, (N, *T, _) in modes.spread.items():
-        f += N * np.stack([gaps.normals(*pair, [i])[0] for pair in zip(t, q, strict=True)])
+    sticks = [i for i in modes.closed if modes.sticks(i)]
+    rows = np.concatenate([gaps.rows[modes.closed], gaps.slip_rows[sticks].ravel()])
+    own = -out[:, rows]
+    own[:, : len(modes.closed)] *= gaps.sign[modes.closed]
+    for i, numbers in modes.spread.items():
+        p = np.array(numbers[:3]) + own @ np.reshape(numbers[4:], (3, -1)).T
+        N = p[:, 0] + gaps.sign[i] * out[:, gaps.rows[i]]
+        f += N[:, None] * np.stack([gaps.normals(*pair, [i])[0] for pair in zip(t, q, strict=True)])
         more[:, gaps.rows[i]] = -gaps.sign[i] * N
         if gaps.rough[i]:
             tangents = np.stack([gaps.slopes(*pair, [i])[0] for pair in zip(t, q, strict=True)])  # (k, 2, n)
-            T = N * _friction(gaps, i, tangents, qd, memory) if modes.slides(i) else np.tile(T[:2], (t.size, 1))
+            T = p[:, 1:] + out[:, gaps.slip_rows[i]]
+            if modes.slides(i):
+                T = N[:, None] * _friction(gaps, i, tangents, qd, memory)
             f += np.einsum("ki,kin->kn", T, tangents)
             more[:, gaps.slip_rows[i]] = -T
     change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])

@@ -343,8 +343,12 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
         closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone, fired), []
     else:
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
+    rows, depending = _independent(inertia, closed, grips)
+    if depending:
+        closed, spare = [i for i in closed if i not in depending], spare + depending
+        rows, _ = _independent(inertia, closed, grips)
+    idle, spread = sorted(idle + spare), {}
     (pushes, *T), rounding, moved, braced = _held(inertia, closed, grips, alone, small + carried)
-    idle, rows, spread = sorted(idle + spare), _independent(inertia, closed, grips), {}
     pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
     bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
     braced = braced and bool(idle)
@@ -376,16 +380,20 @@ def _sharing(G, b, p, mode, cones, response):
 
 
 def _independent(inertia, closed, grips):
-    """Which rows (2,) of the slips of closed contacts that stick are independent of the gaps and of those before."""
+    """Which rows (2,) of the slips of closed contacts that stick are independent of the gaps and of those before.
+
+    And closed gaps that depend on those before.
+    """
+    if not closed:
+        return {}, []
     sticks = [i for i in closed if grips.get(i, ()) is None]
-    if not sticks:
-        return {}
-    rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), -1)])
+    rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), inertia.q.size)])
     loads, kept = inertia.free(rows.T).T, np.zeros(len(rows), bool)
     sizes = (rows * loads).sum(axis=1)
     held = RANK_TOL**2 * sizes.max()  # by bilateral rows
-    # Gram-Schmidt in the metric of kinetic energy: rows that are independent by far come first
-    for k, share in [(k, share) for share in (FAR, RANK_TOL) for k in range(len(rows))]:
+    # Gram-Schmidt in the metric of kinetic energy: of slips, rows that are independent by far come first
+    gaps, slips = range(len(closed)), range(len(closed), len(rows))
+    for k, share in [(k, RANK_TOL) for k in gaps] + [(k, share) for share in (FAR, RANK_TOL) for k in slips]:
         if kept[k]:
             continue
         for _ in range(2):  # as classical Gram-Schmidt is right to rounding
@@ -393,11 +401,12 @@ def _independent(inertia, closed, grips):
             rows[k] -= shares @ rows[kept]
             loads[k] -= shares @ loads[kept]
         left = rows[k] @ loads[k]
-        kept[k] = k < len(closed) or left > max(share * sizes[k], held)
+        kept[k] = left > max(share * sizes[k], held)
         if kept[k]:
             rows[k] /= np.sqrt(max(left, TINY))
             loads[k] /= np.sqrt(max(left, TINY))
-    return dict(zip(sticks, kept[len(closed) :].reshape(-1, 2).tolist(), strict=True))
+    depending = [i for i, own in zip(closed, kept, strict=False) if not own]
+    return dict(zip(sticks, kept[len(closed) :].reshape(-1, 2).tolist(), strict=True)), depending
 
 
 def _demand_unique(G, d, mu, mode):

@@ -62,7 +62,9 @@ def demand_within_cones(solution, scene, load):
 def test_a_wall_that_slides_as_a_whole_stops_where_one_block_does(along, mu):
     """Also where all contacts are as rough as the floor: they are at their bounds without a slip."""
     floor, v = 0.3, np.eye(3)[along]
-    solution = ts.simulate(wall(mu, floor, velocity=v), (0, 0.5)).raise_if_failed()
+    scene = wall(mu, floor, velocity=v)
+    demand_within_cones(ts.simulate(scene, (0, 0.2)), scene, 9 * MASS * G * np.array([*(-floor * v[:2]), 1.0]))
+    solution = ts.simulate(scene, (0, 0.5)).raise_if_failed()
     assert len(solution.phases) == 2
     np.testing.assert_allclose(solution.phases[0][1], 1.0 / (floor * G), rtol=1e-9)
     np.testing.assert_allclose(moved(solution, -1), np.tile(v / (2.0 * floor * G), (9, 1)), atol=1e-9)

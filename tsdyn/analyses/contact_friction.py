@@ -343,23 +343,32 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
         closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone, fired), []
     else:
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
-    rows, depending = _independent(inertia, closed, grips)
-    if depending:
-        closed, spare = [i for i in closed if i not in depending], spare + depending
-        rows, _ = _independent(inertia, closed, grips)
-    idle, spread = sorted(idle + spare), {}
-    (pushes, *T), rounding, moved, braced = _held(inertia, closed, grips, alone, small + carried)
-    pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
-    bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
-    braced = braced and bool(idle)
-    if pulls or braced or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
-        spread, shares = _spread(inertia, closed, idle, grips, alone)
-        pushes, pulls = (shares, False) if spread else (pushes, pulls)
-    slack = slack_of(inertia, closed, pushes, small)
     gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
-    found = ContactState(closed, idle, gdd, grips, rows, slack, gains, begun, cones.slow, spread)
-    change = np.abs(cones.rows @ (moved - response @ p)).reshape(-1, 3).max(axis=1, initial=0.0)
-    return found, pulls, not (change > EVENT_ERROR * sizes.max(axis=1)).any()
+    which = [*closed, *idle, *spare]
+    for again in False, True:
+        if again:  # where all share, closed ones need not push: those that stick first, which hold more rows
+            closed, idle, spare = [], [], []
+            for i in sorted(which, key=lambda i: (grips.get(i, ()) is not None, -N[resting.index(i)])):
+                (idle if depends(inertia, closed, i) else closed).append(i)
+            closed.sort()
+        rows, depending = _independent(inertia, closed, grips)
+        if depending:
+            closed, spare = [i for i in closed if i not in depending], spare + depending
+            rows, _ = _independent(inertia, closed, grips)
+        idle, spread = sorted(idle + spare), {}
+        (pushes, *T), rounding, moved, braced = _held(inertia, closed, grips, alone, small + carried)
+        pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
+        bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
+        braced = braced and bool(idle)
+        if pulls or braced or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
+            spread, shares = _spread(inertia, closed, idle, grips, alone)
+            pushes, pulls = (shares, False) if spread else (pushes, pulls)
+        change = np.abs(cones.rows @ (moved - response @ p)).reshape(-1, 3).max(axis=1, initial=0.0)
+        moves_so = not (change > EVENT_ERROR * sizes.max(axis=1)).any()
+        if moves_so or not spread:
+            break
+    slack = slack_of(inertia, closed, pushes, small)
+    return (ContactState(closed, idle, gdd, grips, rows, slack, gains, begun, cones.slow, spread), pulls, moves_so)
 
 
 def _sharing(G, b, p, mode, cones, response):

@@ -109,6 +109,36 @@ def test_boxes_that_topple_slip_at_one_corner_first():
     np.testing.assert_allclose(whole - both, 2.0 * (half - both), rtol=2e-3)
 
 
+def gripper(weakens):
+    """Two fingers press a box of 1 kg from both sides, with 20 N, which may weaken by so much a second."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    box = scene.add_body(**ts.shapes.box((0.1, 0.1, 0.1), mass=1.0), name="box")
+    for side, name in (-1, "left"), (1, "right"):
+        finger = scene.add_body(0.3, (0.01, 0.01, 0.01), (0.06 * side, 0, 0), name=name)
+        scene.add(C.Translational.at(scene.ground, finger, point=finger.position, axis=(1, 0, 0)))
+        scene.add(ts.forces.PointForce(finger, force=lambda t, *, side=side: (side * (weakens * t - 20.0), 0.0, 0.0)))
+        for k, (y, z) in enumerate(itertools.product((-0.05, 0.05), (-0.05, 0.05))):
+            at = {"point_a": (0.05 * side, y, z), "point_b": (-0.01 * side, 0, 0), "normal_b": (-side, 0, 0)}
+            scene.add(C.PlaneContact(box, finger, **at, unilateral=True, kinetic=0.4, static=0.5, name=f"{name}{k}"))
+    return scene
+
+
+def test_a_gripper_holds_a_box_by_all_its_points():
+    """By those alone whose rows are independent it would turn: which of them carry isn't determined."""
+    solution = ts.simulate(gripper(0.0), (0, 100.0), t_eval=[0.0, 50.0, 100.0])
+    assert len(solution.phases) == 1
+    assert np.abs(solution.position("box")[:, 1:]).max() < 1e-15  # along x nothing holds the whole
+    for k, (side, name) in itertools.product(range(4), ((-1, "left"), (1, "right"))):
+        np.testing.assert_allclose(solution.reaction(f"{name}{k}")[0], [(-5.0 * side, 0.0, G / 8)] * 3, atol=1e-12)
+        assert solution.sticking(f"{name}{k}").all()
+
+
+def test_a_gripper_that_weakens_lets_a_box_slip_when_all_points_are_at_their_bounds():
+    """2 mu F = m g, F = 20 - 10 t."""
+    solution = ts.simulate(gripper(10.0), (0, 1.1))
+    assert abs(solution.phases[0][1] - (2.0 - G / 10.0)) < 1e-12
+
+
 def two_slip_at_once(force):
     """What is left at 1/2 of the bounds of two points, 4.905 N each, that share the friction along their line."""
     across = np.array([0.9, 0.1]) * 0.435 * force

@@ -27,6 +27,7 @@ from .tolerances import (
     FAR,
     LEAST_SHARE,
     LEAST_SLIP,
+    LEAST_WEIGHT,
     LEVEL,
     NEAR_WAY,
     PULLS,
@@ -115,6 +116,7 @@ class Cones:
         for i, d in ways.items():
             self.d[resting.index(i)] = d
         self.rough, self.kinetic, self.static = (x[resting] for x in (gaps.rough, gaps.kinetic, gaps.static))
+        self.broken = bool(inertia.broken)
 
     def solve(self, G, b, bounds=()):
         """Reactions p (3 k,), modes and coefficients (k,), where accelerations are G p + b; raises NoSolution.
@@ -154,8 +156,9 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     """
     kept = None
     for by_rows in False, True:
-        found, pulls = _solve(inertia, resting, qd, fired, by_rows)
-        if found.idle and (alone := _alone(inertia, found, qd, fired)):
+        found, pulls, moves_so = _solve(inertia, resting, qd, fired, by_rows)
+        carries = found.spread and moves_so
+        if found.idle and not carries and (alone := _alone(inertia, found, qd, fired)):
             return alone
         if not pulls:
             kept = kept or found
@@ -175,7 +178,7 @@ def _alone(inertia, found, qd, fired):
     while which not in seen:
         seen.append(which)
         try:
-            again, pulls = _solve(inertia, which, qd, fired)
+            again, pulls, _ = _solve(inertia, which, qd, fired)
         except NoSolution:
             return None
         left = {*found.closed, *found.idle}.difference(again.closed, again.idle)
@@ -291,7 +294,9 @@ def _pair(gaps, i):
 
 
 def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})):
-    """As `solve_rough_contacts`, with the normal loads shared among all contacts; and whether a closed one pulls.
+    """As `solve_rough_contacts`, with the normal loads shared among all contacts; whether a closed one pulls.
+
+    And whether the bodies move so where idle contacts carry nothing, as in the phase.
 
     by_rows: closed contacts are chosen by what holds their rows, instead of by the same accelerations.
     ways: of `Cones`.
@@ -339,12 +344,33 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
         closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone, fired), []
     else:
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
-    pushes, rounding = _held(inertia, closed, grips, alone, small + carried)
-    slack = slack_of(inertia, closed, pushes, small)
     gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
-    rows = _independent(inertia, closed, grips)
-    found = ContactState(closed, sorted(idle + spare), gdd, push, grips, rows, slack, gains, begun, cones.slow)
-    return found, bool((pushes < -rounding).any())
+    which = [*closed, *idle, *spare]
+    for again in False, True:
+        if again:  # where all share, closed ones need not push: those that stick first, which hold more rows
+            closed, idle, spare = [], [], []
+            for i in sorted(which, key=lambda i: (grips.get(i, ()) is not None, -N[resting.index(i)])):
+                (idle if depends(inertia, closed, i) else closed).append(i)
+            closed.sort()
+        rows, depending = _independent(inertia, closed, grips)
+        if depending:
+            closed, spare = [i for i in closed if i not in depending], spare + depending
+            rows, _ = _independent(inertia, closed, grips)
+        idle, spread = sorted(idle + spare), {}
+        (pushes, *T), rounding, moved, braced = _held(inertia, closed, grips, alone, small + carried)
+        pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
+        bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
+        braced = braced and bool(idle)
+        if pulls or braced or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
+            spread, shares = _spread(inertia, closed, idle, grips, alone)
+            pushes, pulls = (shares, False) if spread else (pushes, pulls)
+        change = np.abs(cones.rows @ (moved - response @ p)).reshape(-1, 3).max(axis=1, initial=0.0)
+        moves_so = not (change > EVENT_ERROR * sizes.max(axis=1)).any()
+        if moves_so or not spread:
+            break
+    slack = slack_of(inertia, closed, pushes, small)
+    found = ContactState(closed, idle, gdd, push, grips, rows, slack, gains, begun, cones.slow, spread)
+    return found, pulls, moves_so
 
 
 def _sharing(G, b, p, mode, cones, response):
@@ -353,26 +379,32 @@ def _sharing(G, b, p, mode, cones, response):
     Where slips depend on each other, the solution may have some at their bounds that others could relieve.
     """
     moves, terms = ((x @ y + z).reshape(-1, 3)[:, 1:] for x, y, z in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
-    still = cones.rough & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= LEVEL * terms).all(axis=1)
+    # Where one has just reached the bound it goes on to slide; those that are at it stay, as bodies that slide as one
+    level, beyond = (LEVEL, -EVENT_ERROR) if cones.broken else (EVENT_ERROR, EVENT_ERROR)
+    still = cones.rough & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= level * terms).all(axis=1)
     if (mode[still] == STICKS).all():
         return mode
     loads = response.T[np.repeat(still, 3)]
     N, *T = shared(cones.static[still], loads, p.reshape(-1, 3)[still]).T
-    within = np.hypot(*T) < (1.0 - EVENT_ERROR) * cones.static[still] * N
+    within = np.hypot(*T) < (1.0 + beyond) * cones.static[still] * N
     return np.where(still, STICKS, mode) if within.all() else mode
 
 
 def _independent(inertia, closed, grips):
-    """Which rows (2,) of the slips of closed contacts that stick are independent of the gaps and of those before."""
+    """Which rows (2,) of the slips of closed contacts that stick are independent of the gaps and of those before.
+
+    And closed gaps that depend on those before.
+    """
+    if not closed:
+        return {}, []
     sticks = [i for i in closed if grips.get(i, ()) is None]
-    if not sticks:
-        return {}
-    rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), -1)])
+    rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), inertia.q.size)])
     loads, kept = inertia.free(rows.T).T, np.zeros(len(rows), bool)
     sizes = (rows * loads).sum(axis=1)
     held = RANK_TOL**2 * sizes.max()  # by bilateral rows
-    # Gram-Schmidt in the metric of kinetic energy: rows that are independent by far come first
-    for k, share in [(k, share) for share in (FAR, RANK_TOL) for k in range(len(rows))]:
+    # Gram-Schmidt in the metric of kinetic energy: of slips, rows that are independent by far come first
+    gaps, slips = range(len(closed)), range(len(closed), len(rows))
+    for k, share in [(k, RANK_TOL) for k in gaps] + [(k, share) for share in (FAR, RANK_TOL) for k in slips]:
         if kept[k]:
             continue
         for _ in range(2):  # as classical Gram-Schmidt is right to rounding
@@ -380,11 +412,12 @@ def _independent(inertia, closed, grips):
             rows[k] -= shares @ rows[kept]
             loads[k] -= shares @ loads[kept]
         left = rows[k] @ loads[k]
-        kept[k] = k < len(closed) or left > max(share * sizes[k], held)
+        kept[k] = left > max(share * sizes[k], held)
         if kept[k]:
             rows[k] /= np.sqrt(max(left, TINY))
             loads[k] /= np.sqrt(max(left, TINY))
-    return dict(zip(sticks, kept[len(closed) :].reshape(-1, 2).tolist(), strict=True))
+    depending = [i for i, own in zip(closed, kept, strict=False) if not own]
+    return dict(zip(sticks, kept[len(closed) :].reshape(-1, 2).tolist(), strict=True)), depending
 
 
 def _demand_unique(G, d, mu, mode):
@@ -424,7 +457,7 @@ def _pushing(inertia, which, grips, b, fired):
 
     With dependent rows loads of contacts that slide may be independent: other ones give other accelerations.
     """
-    A, a = _holding(inertia, which, grips, b)
+    A, a, _ = _holding(inertia, which, grips, b)
     return _basis(inertia, which, np.hstack([A, -A[:, len(which) :]]), -a, fired)
 
 
@@ -498,54 +531,115 @@ def _loads(inertia, which, ways):
 
 
 def _held(inertia, closed, grips, b, small):
-    """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations; their rounding.
+    """Reactions (3, k) of closed gaps where they and slips of those that stick have no accelerations; rounding (k,).
+
+    And the accelerations (n,) of all coordinates by these.
 
     b: accelerations (3,) of gaps and slips where all are open, by gaps; small (count,): rounding of accelerations of
     gaps. Reactions may fall below zero by twice their rounding: by the error of reactions at an event. Largest
     reactions are those, or what one contact alone would carry of the terms: in free fall all reactions are rounding.
     """
-    (A, a), k = _holding(inertia, closed, grips, b), len(closed)
+    (A, a, response), k = _holding(inertia, closed, grips, b), len(closed)
     by = least_squares(A, np.eye(len(A)), RANK_TOL**2)
-    p, by = -by @ a, by[:k]
-    pushes, sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
+    p, by, found, braced = -by @ a, by[:k], np.zeros((k, 3)), False
+    found[:, 0], sticks = p[:k], [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
     if sticks:
         at, slips = [closed.index(i) for i in sticks], p[k:].reshape(-1, 2)
         loads = inertia.free(rows_of(inertia, sticks).T).T * inertia.gaps.levers(inertia.q)
-        pushes[at] = shared(inertia.gaps.static[sticks], loads, np.column_stack([pushes[at], slips]))[:, 0]
+        found[at], braced = share(inertia.gaps.static[sticks], loads, np.column_stack([found[at, 0], slips]))
+    pushes = found[:, 0]
     largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
     most = PULLS * np.maximum(largest, carried)
-    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
+    limits = np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
+    return found.T, limits, response @ p, braced
+
+
+def _spread(inertia, closed, idle, grips, b):
+    """Reactions of closed and idle contacts from those of the rows of a phase, all within bounds; those of closed ones.
+
+    The rows of a phase are independent: where contacts depend on each other, some carry nothing, and a few what all of
+    them could. Here all carry. At first their reactions lie as deep in their cones as they can, see `deepest`; in the
+    phase they change by the least share of their bounds. Friction of those that slide goes with their normal reactions.
+    At the bound, to the error of events, friction still holds.
+
+    Returns
+    -------
+    spread : dict
+        Numbers (4 + 3 r,) of each: normal reaction, friction along both slips, and what its friction may exceed the
+        bound by; then by how much these three grow with reactions of the rows (r,), those of closed gaps first, then of
+        the slips of those that stick. Empty where no reactions are within their bounds.
+    pushes : ndarray (k,)
+    """
+    (A, a, _), k, which, gaps = _holding(inertia, closed, grips, b), len(closed), [*closed, *idle], inertia.gaps
+    sticks = np.array([gaps.rough[i] and grips[i] is None for i in which])
+    p = -least_squares(A, a, RANK_TOL**2)
+    loads = rows_of(inertia, which).reshape(len(which), 3, -1)
+    loads[:, 0] = _loads(inertia, which, _ways(inertia, grips))
+    loads[~sticks, 1:] = 0.0
+    loads = inertia.free(loads.reshape(3 * len(which), -1).T).T * gaps.levers(inertia.q)
+    own = np.zeros((len(which), 3), bool)
+    own[:k, 0], own[:k, 1:] = True, sticks[:k, None]
+    rows = np.flatnonzero(own)
+    rows = np.concatenate([rows[rows % 3 == 0], rows[rows % 3 > 0]])
+    x = np.zeros(own.size)
+    x[rows] = p
+    size = np.linalg.norm(loads, axis=1)
+    some = size > RANK_TOL * size.max(initial=0.0)
+    free = null_space(loads[some].T, RANK_TOL)
+    if not free.size:
+        return {}, p[:k]
+    ways = np.zeros((x.size, free.shape[1]))
+    ways[some] = free
+    mu = np.where(sticks, gaps.static[which], 1.0)
+    found = deepest(mu, x.reshape(-1, 3), ways)
+    left, largest = mu * found[:, 0] - np.hypot(*found[:, 1:].T), np.abs(found).max()
+    if (np.minimum(left, found[:, 0]) < -EVENT_ERROR * largest).any():
+        return {}, p[:k]
+    more = np.where(sticks & (left < EVENT_ERROR * largest), 4.0 * EVENT_ERROR * largest, 0.0)
+    weight = np.maximum(found[:, :1], LEAST_WEIGHT * largest) * np.column_stack([np.ones(len(mu)), mu, mu])
+    weight = np.where(some, weight.ravel(), 0.0)[:, None]
+    by = weight * least_squares((weight * loads).T, loads[rows].T, RANK_TOL)
+    start = found - (by @ p).reshape(-1, 3)
+    numbers = np.column_stack([start, more, by.reshape(len(which), -1)])
+    return dict(zip(which, map(tuple, numbers.tolist()), strict=True)), found[:k, 0]
 
 
 def _holding(inertia, closed, grips, b):
-    """Accelerations of closed gaps, then of slips of those that stick, by their reactions, and where all are open."""
+    """Accelerations of closed gaps, then of slips of those that stick, by their reactions, and where all are open.
+
+    And those of all coordinates by these reactions.
+    """
     sticks = [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
     slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
     loads = np.concatenate([_loads(inertia, closed, _ways(inertia, grips)), slips])
     rows = np.concatenate([inertia.J[closed], slips])
-    return product(rows, inertia.free(loads.T)), np.array(
-        [*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])]
-    )
+    response, a = inertia.free(loads.T), [*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])]
+    return product(rows, response), np.array(a), response
 
 
-def shared(static, loads, p):
+def shared(*given):
+    """The reactions alone of `share`."""
+    return share(*given)[0]
+
+
+def share(static, loads, p):
     """The same reactions p (c, 3) of contacts that stick, shared among them: as deep in their cones as they can.
 
     loads (3 c, n): accelerations by unit reactions. Where slips depend on each other alone, friction is in proportion
     to its bounds. Where they depend on gaps, contacts brace each other, as those of a ball with floor and wall along
-    the line through both points: see `deepest`.
+    the line through both points: see `deepest`. And whether they do.
     """
     sizes, free = np.linalg.norm(loads, axis=1), np.zeros((0, 0))
     some = sizes > RANK_TOL * sizes.max(initial=0.0)  # others are held
     if p.any():
         free = null_space(loads[some].T, RANK_TOL)
     if not free.size:
-        return p
+        return p, False
     ways = np.zeros((p.size, free.shape[1]))
     ways[some] = free
     if np.abs(ways[::3]).max() <= RANK_TOL:
-        return _in_proportion(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p)
-    return deepest(static, p, ways)
+        return _in_proportion(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p), False
+    return deepest(static, p, ways), True
 
 
 def _in_proportion(bounds, slips, p):

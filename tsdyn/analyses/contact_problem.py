@@ -245,6 +245,8 @@ class Inertia:
         Those that may be held closed, independent: a guess.
     loads : ndarray (n,), optional
         Beside those of the scene.
+    broken : sequence of int
+        Gaps whose friction has just reached its bound.
 
     Attributes
     ----------
@@ -254,8 +256,9 @@ class Inertia:
         Rows of the slips; zero without friction.
     """
 
-    def __init__(self, gaps, t, q, slots, which, held=(), loads=None):
+    def __init__(self, gaps, t, q, slots, which, held=(), loads=None, broken=()):
         self.gaps, self.t, self.q, self.slots, self.which, self.held = gaps, t, q, slots, np.array(which, int), held
+        self.broken = broken
         rows, drift = gaps.workspace.rows(t, q, self.which)
         self._rows, self._drift = gaps.sign[self.which, None] * rows, (gaps.sign * drift[: gaps.count])[self.which]
         self.J, self.response, self.G = (np.zeros((gaps.count, size)) for size in (q.size, q.size, gaps.count))
@@ -391,6 +394,7 @@ class ContactState(NamedTuple):
     gains: dict = MappingProxyType({})  # of those that slide: accelerations (2,) of their slips, m/s^2
     begun: dict = MappingProxyType({})  # the size of these, of those that begin to slide, above rounding
     slow: np.ndarray | None = None  # (count,) slips, m/s, below which friction keeps a direction
+    spread: dict = MappingProxyType({})  # of closed and idle ones, see contact_friction.py
 
 
 def solve_contacts(inertia, resting, qd, fired=()):

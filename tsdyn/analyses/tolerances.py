@@ -138,6 +138,8 @@ SLOWEST_SLIP, LEAST_SLIP = 1e-2, 1e-5
 NEAR_WAY, SECANTS = 0.98, 3
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
+# Of the largest reaction: contacts that carry less share changes of the load as if they carried this.
+LEAST_WEIGHT = 1e-3
 # Square of the sine of the angle between a slip of a contact that sticks and the rows that hold, above which it is
 # independent of them by far.
 FAR = 1e-2

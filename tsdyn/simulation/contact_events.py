@@ -37,16 +37,22 @@ class ReactionParts(NamedTuple):
     which: np.ndarray  # int64 (sticking,)  which of the closed stick
     slip: np.ndarray  # int64 (2 sticking,)  rows of their slips; -1 of one that depends on others
     static: np.ndarray  # (sticking,)
+    own: np.ndarray  # int64 (r or 0,)  rows of closed gaps and of slips that stick, if contacts share their reactions,
+    spread: np.ndarray  # (k, 4 + 3 r)  by `ContactState.spread`, closed contacts first,
+    limits: np.ndarray  # (k,)  and static coefficients; -1 of those that slide
     lam: np.ndarray  # (m,)  scratch
 
 
 _none, _whole = np.zeros(0), np.zeros(0, int)
-load_reactions = loader(ReactionParts(ReactionNumbers(), _none, _whole, _none, _none, _whole, _whole, _none, _none))
+load_reactions = loader(ReactionParts(
+        ReactionNumbers(), _none, _whole, _none, _none, _whole, _whole, _none, _whole, np.zeros((0, 0)), _none, _none
+    )
+)  # fmt: skip
 
 
 @callback(VALUES)
 def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: VALUES
-    """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique."""
+    """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique, nor shared."""
     c, x = load_parts(parts), load_reactions(own)
     closed, lam = x.normal.size, x.lam
     values = vector(out, closed + x.which.size)
@@ -58,7 +64,42 @@ def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: 
         i, j = x.slip[2 * k], x.slip[2 * k + 1]
         T = math.hypot(lam[i], lam[j]) if i >= 0 and j >= 0 else math.nan
         values[closed + k] = x.static[k] * values[x.which[k]] - T
+    if x.own.size > 0:
+        _share(x, values)
     return 0
+
+
+@kernel
+def _share(x, values):
+    """Values of reactions that contacts share; what is left to idle ones counts as that of those that stick."""
+    closed, sticking, s = x.normal.size, x.which.size, x.spread
+    for k in range(closed, values.size):
+        values[k] = math.inf
+    for i in range(s.shape[0]):
+        N, T0, T1, at = s[i, 0], s[i, 1], s[i, 2], 4
+        for c in range(3):
+            total = 0.0
+            for j in range(x.own.size):
+                row = x.own[j]
+                if row >= 0:
+                    total -= s[i, at + j] * x.lam[row] * (x.sign[j] if j < closed else 1.0)
+            at += x.own.size
+            if c == 0:
+                N += total
+            elif c == 1:
+                T0 += total
+            else:
+                T1 += total
+        if i < closed:
+            values[i] = x.slack[i] + N
+        left = N if x.limits[i] < 0.0 else x.limits[i] * N - math.hypot(T0, T1) + s[i, 3]
+        if i < closed:
+            for k in range(sticking):
+                if x.which[k] == i:
+                    values[closed + k] = min(values[closed + k], left)
+        elif sticking > 0:
+            k = closed + i % sticking
+            values[k] = min(values[k], left)
 
 
 class Reactions(KernelFunctions):
@@ -83,9 +124,12 @@ class Reactions(KernelFunctions):
         self.which = np.array([self.closed.index(i) for i in self.sticks], int)
         self.smooth = np.flatnonzero(~gaps.rough[self.closed])
         self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
+        own = [self.normal, self.slip.ravel()] if modes.spread else [_whole]
+        self.own, self.spread = np.concatenate(own), np.array([*modes.spread.values()], float, ndmin=2)
+        self.limits = np.array([gaps.static[i] if modes.sticks(i) else -1.0 for i in modes.spread])
         self.shares = False  # whether dependent rows share friction, which the kernel doesn't know of
-        # Rows of gaps that are redundant have no reaction; where there is friction they have an unknown one
-        self.redundant = np.nan if rough else 0.0
+        # Rows of gaps that are redundant have no reaction; where there is friction they have an unknown one, or a share
+        self.redundant = np.nan if rough and not modes.spread else 0.0
 
     @cached_property
     def workspace(self):
@@ -99,7 +143,8 @@ class Reactions(KernelFunctions):
         own, *self._keep = resident(
             ReactionParts(
                 ReactionNumbers(redundant=self.redundant), memory, self.normal, self.gaps.sign[self.closed], self.slack,
-                self.which, self.slip.ravel(), self.gaps.static[self.sticks], scratch,
+                self.which, self.slip.ravel(), self.gaps.static[self.sticks], self.own, self.spread, self.limits,
+                scratch,
             )
         )  # fmt: skip
         count = len(self.closed) + len(self.sticks)

@@ -61,7 +61,7 @@ from .unit_events import Breaking, Closing, Slowing
 # impact, where gaps close; those that are closed and at rest stay so as the complementarity problem of accelerations
 # says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg, are left out
 # of the rows: the others hold them. They may do so to first order alone, as the ends of an edge on a face that tips: a
-# gap that falls ends the run.
+# gap that falls ends the run. Where those that stick need it, all share their reactions, see `UnitModes.spread`.
 #
 # `UnitModes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
 
@@ -146,6 +146,7 @@ class _ContactRun(Transitions, Checkpoints):
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
         self.halting, self.known_fast = None, {}  # of the phase: `Halting`; what a checkpoint has of it
         self.hits = {}  # of gaps after impacts: the time, and the largest rate since and just before
+        self.broken = []  # contacts whose friction has just reached its bound
 
     def _take_scene(self, scene, inactive=None, values=None):
         """What follows from the scene alone, and makes the scenes of its phases.

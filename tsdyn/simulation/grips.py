@@ -141,8 +141,11 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
         redundant, alone = np.isnan(T), np.nan_to_num(T)
         own = N[:, sticks]
         braced = [frictional[j] for j in sticks], t, q, memory, own, T, smooth, M
-        N[:, sticks], T, others = carried(gaps, *braced)
-        if redundant.any():
+        if modes.spread:
+            T, others = alone, M
+        else:
+            N[:, sticks], T, others = carried(gaps, *braced)
+        if redundant.any() and not modes.spread:
             # M qdd + Phi_q^T (lam + change) = Q + J^T T    J: redundant slips
             f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
             more = np.hstack([N[:, sticks] - own, others - M])
@@ -164,10 +167,43 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
             out[:, gaps.rows[which]] = -gaps.sign[which] * N[:, sticks]
         if (others != M).any():
             out[:, gaps.rows[smooth]] = -gaps.sign[smooth] * others
-    slip = np.einsum("kcin,kn->kci", tangents, qd)
     for j, i in enumerate(frictional):
         if modes.slides(i):
             out[:, gaps.rows[i]] = -gaps.sign[i] * N[:, j]
-            d, v = gaps.across(i, tangents[:, j], memory[:, gaps.slots[i] :][:, :3]), slip[:, j]  # (k, 2)
-            e = twin(heading)(v[:, 0], v[:, 1], 0.0, np.column_stack([d, np.zeros(len(d))]).T, 1.0)[:2]
-            out[:, rows[j]] = (gaps.kinetic[i] * N[:, j])[:, None] * np.array(e).T
+            out[:, rows[j]] = -N[:, j, None] * _friction(gaps, i, tangents[:, j], qd, memory)
+    if modes.spread:
+        _add_shared(gaps, modes, packed, shared, t, q, qd, memory, out)
+
+
+def _friction(gaps, i, tangents, qd, memory):
+    """Friction (k, 2) along the slips (k, 2, n) of a contact that slides, for unit normal reactions."""
+    d, v = gaps.across(i, tangents, memory[:, gaps.slots[i] :][:, :3]), np.einsum("kin,kn->ki", tangents, qd)
+    e = twin(heading)(v[:, 0], v[:, 1], 0.0, np.column_stack([d, np.zeros(len(d))]).T, 1.0)[:2]
+    return -gaps.kinetic[i] * np.array(e).T
+
+
+def _add_shared(gaps, modes, packed, shared, t, q, qd, memory, out):
+    """Have contacts share their reactions in out (k, m), by `UnitModes.spread`; what else holds balances them."""
+    first, f, more = first_row_of(packed), np.zeros_like(q), np.zeros_like(out)
+    sticks = [i for i in modes.closed if modes.sticks(i)]
+    rows = np.concatenate([gaps.rows[modes.closed], gaps.slip_rows[sticks].ravel()])
+    own = -out[:, rows]
+    own[:, : len(modes.closed)] *= gaps.sign[modes.closed]
+    for i, numbers in modes.spread.items():
+        p = np.array(numbers[:3]) + own @ np.reshape(numbers[4:], (3, -1)).T
+        N = p[:, 0] + gaps.sign[i] * out[:, gaps.rows[i]]
+        f += N[:, None] * np.stack([gaps.normals(*pair, [i])[0] for pair in zip(t, q, strict=True)])
+        more[:, gaps.rows[i]] = -gaps.sign[i] * N
+        if gaps.rough[i]:
+            tangents = np.stack([gaps.slopes(*pair, [i])[0] for pair in zip(t, q, strict=True)])  # (k, 2, n)
+            T = p[:, 1:] + out[:, gaps.slip_rows[i]]
+            if modes.slides(i):
+                T = N[:, None] * _friction(gaps, i, tangents, qd, memory)
+            f += np.einsum("ki,kin->kn", T, tangents)
+            more[:, gaps.slip_rows[i]] = -T
+    change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
+    more[:, shared[0]] += change[:, shared[1]]
+    for i in modes.closed:
+        if modes.slides(i):
+            more[:, gaps.rows[i]] += change[:, first[id(gap_row(gaps, modes, i))]]
+    out += np.nan_to_num(more)

@@ -36,6 +36,7 @@ class UnitModes:
     slack: dict = field(default_factory=dict)  # closed with a reaction of rounding: how far below zero it leaves, N
     lifted: list = field(default_factory=list)  # opened to flights below rounding of the gap, which end at the top
     rising: dict = field(default_factory=dict)  # time and acceleration where a contact has begun to slide
+    spread: dict = field(default_factory=dict)  # of contacts whose reactions are shared, see `ContactState.spread`
 
     def sticks(self, i):
         """Whether a contact with friction sticks."""

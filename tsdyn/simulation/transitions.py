@@ -53,7 +53,8 @@ class Transitions:
         low = FLIGHT * self.gaps.lengths(self.length)
         idle = [i for i in before.idle if self.gap[i] <= low[i]]  # the others have opened
         touching = {*self.near, *hit, *before.closed, *idle}.intersection(self.able)
-        turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
+        slips = [i - count - own for i in fired if i >= count + own]
+        turned, self.broken = (list(filter(of, slips)) for of in (before.slides, before.sticks))
         broken = [i - count for i in fired if count <= i < count + own]
         status = self._settle(sorted(touching), hit, broken, turned)
         if measured and self.qd is not qd:
@@ -120,7 +121,7 @@ class Transitions:
             if len(touching) == 1 and self._bounces(touching[0], before, slots):
                 return None
             near = self._low_flights(touching)
-            inertia = Inertia(self.gaps, self.t, self.q, slots, [*touching, *near], before.closed)
+            inertia = Inertia(self.gaps, self.t, self.q, slots, [*touching, *near], before.closed, broken=self.broken)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies; rates that are
             # rounding of these are of no sign, and no start of a flight
@@ -244,6 +245,7 @@ class Transitions:
         """Take over a `ContactState`."""
         self.remembered, modes = self.remembered.copy(), self.modes
         modes.closed, modes.idle, modes.slack = contacts.closed, contacts.idle, dict(contacts.slack)
+        modes.spread = dict(contacts.spread)
         modes.rising = {i: (self.t, gain) for i, gain in contacts.begun.items()}
         modes.grips = gripped(self.gaps, before, contacts, self.q, self.remembered[self.count :])
 
@@ -270,7 +272,7 @@ class Transitions:
             slots, gaps = self.remembered[self.count :].copy(), self._gaps_with(holds)
             for unit in self.frictions.units:
                 slots[unit.way] = 0.0  # their loads are known
-            inertia = Inertia(gaps, self.t, self.q, slots, touching, self.modes.closed, self.friction)
+            inertia = Inertia(gaps, self.t, self.q, slots, touching, self.modes.closed, self.friction, self.broken)
             dead = [i for i in resting if inertia.G[i, i] <= RANK_TOL * unheld.G[i, i]]  # frictions hold these
             contacts = contact_state(inertia, [i for i in resting if i not in dead], self.qd, leaving)
             a = contacts.accelerations

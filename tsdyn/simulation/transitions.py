@@ -54,7 +54,7 @@ class Transitions:
         idle = [i for i in before.idle if self.gap[i] <= low[i]]  # the others have opened
         touching = {*self.near, *hit, *before.closed, *idle}.intersection(self.able)
         slips = [i - count - own for i in fired if i >= count + own]
-        turned, self.broken = (list(filter(of, slips)) for of in (before.slides, before.sticks))
+        turned, self.broken = list(filter(before.slides, slips)), slips
         broken = [i - count for i in fired if count <= i < count + own]
         status = self._settle(sorted(touching), hit, broken, turned)
         if measured and self.qd is not qd:

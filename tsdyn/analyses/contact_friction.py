@@ -355,20 +355,27 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
         if depending:
             closed, spare = [i for i in closed if i not in depending], spare + depending
             rows, _ = _independent(inertia, closed, grips)
-        idle, spread = sorted(idle + spare), {}
+        idle = sorted(idle + spare)
         (pushes, *T), rounding, moved, braced = _held(inertia, closed, grips, alone, small + carried)
         pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
         bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
         braced = braced and bool(idle)
-        if pulls or braced or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
-            spread, shares = _spread(inertia, closed, idle, grips, alone)
-            pushes, pulls = (shares, False) if spread else (pushes, pulls)
         change = np.abs(cones.rows @ (moved - response @ p)).reshape(-1, 3).max(axis=1, initial=0.0)
         moves_so = not (change > EVENT_ERROR * sizes.max(axis=1)).any()
-        if moves_so or not spread:
+        if not again:
+            slack = slack_of(inertia, closed, pushes, small)
+            state = ContactState(closed, idle, gdd, grips, rows, slack, gains, begun, cones.slow)
+            found = state, pulls, moves_so
+        beyond = (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any()
+        if not (sticks and (again or pulls or braced or beyond)):
             break
-    slack = slack_of(inertia, closed, pushes, small)
-    return (ContactState(closed, idle, gdd, grips, rows, slack, gains, begun, cones.slow, spread), pulls, moves_so)
+        spread, shares = _spread(inertia, closed, idle, grips, alone)
+        if not spread:
+            break
+        if moves_so:
+            slack = slack_of(inertia, closed, shares, small)
+            return state._replace(closed=closed, idle=idle, rows=rows, slack=slack, spread=spread), False, True
+    return found
 
 
 def _sharing(G, b, p, mode, cones, response):

@@ -19,7 +19,7 @@ import numpy as np
 from ..maths.central_path import deepest
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
-from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
+from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import (
     AHEAD,
@@ -344,7 +344,8 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
     else:
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
     gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
-    which = [*closed, *idle, *spare]
+    which, ways = [*closed, *idle, *spare], [d for d in grips.values() if d is not None]
+    as_one = all(np.abs(d - ways[0]).max() < HALF_DIGITS for d in ways)  # shares of slips that turn would turn, too
     for again in False, True:
         if again:  # where all share, closed ones need not push: those that stick first, which hold more rows
             closed, idle, spare = [], [], []
@@ -367,7 +368,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
             state = ContactState(closed, idle, gdd, grips, rows, slack, gains, begun, cones.slow)
             found = state, pulls, moves_so
         beyond = (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any()
-        if not (sticks and (again or pulls or braced or beyond)):
+        if not (sticks and as_one and (again or pulls or braced or beyond)):
             break
         spread, shares = _spread(inertia, closed, idle, grips, alone)
         if not spread:

@@ -19,7 +19,7 @@ import numpy as np
 from ..maths.central_path import MARGIN, deepest, inwards
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
-from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
+from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import (
     AHEAD,
@@ -345,7 +345,8 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
     else:
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
     gains = {resting[j]: moves[j] for j in np.flatnonzero(slides)}
-    which = [*closed, *idle, *spare]
+    which, ways = [*closed, *idle, *spare], [d for d in grips.values() if d is not None]
+    as_one = all(np.abs(d - ways[0]).max() < HALF_DIGITS for d in ways)  # shares of slips that turn would turn, too
     for again in False, True:
         if again:  # where all share, closed ones need not push: those that stick first, which hold more rows
             closed, idle, spare = [], [], []
@@ -356,21 +357,27 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
         if depending:
             closed, spare = [i for i in closed if i not in depending], spare + depending
             rows, _ = _independent(inertia, closed, grips)
-        idle, spread = sorted(idle + spare), {}
+        idle = sorted(idle + spare)
         (pushes, *T), rounding, moved, braced = _held(inertia, closed, grips, alone, small + carried)
         pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
         bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
         braced = braced and bool(idle)
-        if pulls or braced or (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any():
-            spread, shares = _spread(inertia, closed, idle, grips, alone)
-            pushes, pulls = (shares, False) if spread else (pushes, pulls)
         change = np.abs(cones.rows @ (moved - response @ p)).reshape(-1, 3).max(axis=1, initial=0.0)
         moves_so = not (change > EVENT_ERROR * sizes.max(axis=1)).any()
-        if moves_so or not spread:
+        if not again:
+            slack = slack_of(inertia, closed, pushes, small)
+            state = ContactState(closed, idle, gdd, push, grips, rows, slack, gains, begun, cones.slow)
+            found = state, pulls, moves_so
+        beyond = (np.hypot(*T) > np.maximum(bounds, gaps.static[closed] * rounding))[sticks].any()
+        if not (sticks and as_one and (again or pulls or braced or beyond)):
             break
-    slack = slack_of(inertia, closed, pushes, small)
-    found = ContactState(closed, idle, gdd, push, grips, rows, slack, gains, begun, cones.slow, spread)
-    return found, pulls, moves_so
+        spread, shares = _spread(inertia, closed, idle, grips, alone)
+        if not spread:
+            break
+        if moves_so:
+            slack = slack_of(inertia, closed, shares, small)
+            return state._replace(closed=closed, idle=idle, rows=rows, slack=slack, spread=spread), False, True
+    return found
 
 
 def _sharing(G, b, p, mode, cones, response):

@@ -339,6 +339,8 @@ class _CalleeCache(_Cache):
     def save_overload(self, sig, data):
         """Store the kernel."""
         library, fndesc = data.library, data.fndesc
+        if any(isinstance(kind, types.Callable) for kind in sig):  # a function of this process
+            return
         bitcode = library._get_module_for_linking().as_bitcode()
         if files.folder() is None or any(name.encode() in bitcode for name in (_DYNAMIC, RuntimeLinker.PREFIX)):
             return

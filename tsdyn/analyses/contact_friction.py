@@ -362,7 +362,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
         pulls, sticks = bool((pushes < -rounding).any()), [k for k, i in enumerate(closed) if i in rows]
         bounds = (1.0 - EVENT_ERROR) * gaps.static[closed] * pushes
         braced = braced and bool(idle)
-        change = np.abs(cones.rows @ (moved - response @ p)).reshape(-1, 3).max(axis=1, initial=0.0)
+        change = np.abs(cones.rows @ (moved - push)).reshape(-1, 3).max(axis=1, initial=0.0)
         moves_so = not (change > EVENT_ERROR * sizes.max(axis=1)).any()
         if not again:
             slack = slack_of(inertia, closed, pushes, small)
@@ -392,7 +392,7 @@ def _sharing(G, b, p, mode, cones, response):
     if (mode[still] == STICKS).all():
         return mode
     loads = response.T[np.repeat(still, 3)]
-    N, *T = shared(cones.static[still], loads, p.reshape(-1, 3)[still]).T
+    N, *T = share(cones.static[still], loads, p.reshape(-1, 3)[still])[0].T
     within = np.hypot(*T) < (1.0 + beyond) * cones.static[still] * N
     return np.where(still, STICKS, mode) if within.all() else mode
 
@@ -540,7 +540,7 @@ def _loads(inertia, which, ways):
 def _held(inertia, closed, grips, b, small):
     """Reactions (3, k) of closed gaps where they and slips of those that stick have no accelerations; rounding (k,).
 
-    And the accelerations (n,) of all coordinates by these.
+    And the accelerations (n,) of all coordinates by these; whether those that stick brace each other, see `share`.
 
     b: accelerations (3,) of gaps and slips where all are open, by gaps; small (count,): rounding of accelerations of
     gaps. Reactions may fall below zero by twice their rounding: by the error of reactions at an event. Largest
@@ -622,11 +622,6 @@ def _holding(inertia, closed, grips, b):
     rows = np.concatenate([inertia.J[closed], slips])
     response, a = inertia.free(loads.T), [*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])]
     return product(rows, response), np.array(a), response
-
-
-def shared(*given):
-    """The reactions alone of `share`."""
-    return share(*given)[0]
 
 
 def share(static, loads, p):

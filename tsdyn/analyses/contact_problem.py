@@ -246,7 +246,7 @@ class Inertia:
     loads : ndarray (n,), optional
         Beside those of the scene.
     broken : sequence of int
-        Gaps whose friction has just reached its bound.
+        Gaps whose slips have just begun, ended or turned.
 
     Attributes
     ----------

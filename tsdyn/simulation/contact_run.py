@@ -146,7 +146,6 @@ class _ContactRun(Transitions, Checkpoints):
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
         self.halting, self.known_fast = None, {}  # of the phase: `Halting`; what a checkpoint has of it
         self.hits = {}  # of gaps after impacts: the time, and the largest rate since and just before
-        self.broken = []  # contacts whose friction has just reached its bound
 
     def _take_scene(self, scene, inactive=None, values=None):
         """What follows from the scene alone, and makes the scenes of its phases.

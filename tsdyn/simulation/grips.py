@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..analyses.contact_friction import shared
+from ..analyses.contact_friction import share
 from ..analyses.contact_problem import slip_rows
 from ..analyses.tolerances import EVENT_ERROR, LEAST_SLIP
 from ..elements.bodies import rotation_matrix
@@ -92,7 +92,7 @@ def slip_columns(gap, first):
 def carried(gaps, which, t, q, memory, N, T, smooth, M):
     """N (k, c) and friction (k, c, 2) of contacts that stick, where rows depend on others; M (k, d) of those `smooth`.
 
-    Friction is shared in proportion to N, but where reactions brace each other, see `shared`. Contacts without friction
+    Friction is shared in proportion to N, but where reactions brace each other, see `share`. Contacts without friction
     brace others where these alone don't hold.
     """
     N, T, M = N.copy(), T.copy(), M.copy()
@@ -100,13 +100,13 @@ def carried(gaps, which, t, q, memory, N, T, smooth, M):
     c, static = len(which), np.append(gaps.static[which], np.ones(len(smooth)))
     for k in depend.nonzero()[0]:
         loads = (gaps.responses(t[k], q[k], memory[k], [*which, *smooth]) * gaps.levers(q[k])).reshape(-1, q.shape[1])
-        p = shared(static[:c], loads[: 3 * c], np.column_stack([N[k], np.nan_to_num(T[k])]))
+        p, _ = share(static[:c], loads[: 3 * c], np.column_stack([N[k], np.nan_to_num(T[k])]))
         if smooth and (np.hypot(*p[:, 1:].T) > (1.0 + EVENT_ERROR) * static[:c] * p[:, 0]).any():
             sizes = np.linalg.norm(loads, axis=1)[::3]
             unit = sizes[c:] / sizes[:c].max()  # reactions of stops are torques
             loads[3 * c :: 3] /= unit[:, None]
             given = np.vstack([p, np.outer(M[k] * unit, (1.0, 0.0, 0.0))])
-            p = shared(static, loads, given)
+            p, _ = share(static, loads, given)
             M[k] = p[c:, 0] / unit
         N[k], T[k] = p[:c, 0], p[:c, 1:]
     return N, T, M
@@ -139,19 +139,17 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
         for j, i in enumerate(sticks):
             T[:, j, [k for k, held in enumerate(modes.grips[frictional[i]]) if not held]] = np.nan
         redundant, alone = np.isnan(T), np.nan_to_num(T)
-        own = N[:, sticks]
-        braced = [frictional[j] for j in sticks], t, q, memory, own, T, smooth, M
+        own, stuck = N[:, sticks], [frictional[j] for j in sticks]
         if modes.spread:
             T, others = alone, M
         else:
-            N[:, sticks], T, others = carried(gaps, *braced)
+            N[:, sticks], T, others = carried(gaps, stuck, t, q, memory, own, T, smooth, M)
         if redundant.any() and not modes.spread:
             # M qdd + Phi_q^T (lam + change) = Q + J^T T    J: redundant slips
             f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
             more = np.hstack([N[:, sticks] - own, others - M])
             if more.any():
-                which = [*(frictional[j] for j in sticks), *smooth]
-                normals = np.array([gaps.normals(*pair, which) for pair in zip(t, q, strict=True)])
+                normals = np.array([gaps.normals(*pair, [*stuck, *smooth]) for pair in zip(t, q, strict=True)])
                 f = np.einsum("kc,kcn->kn", more, normals) + np.einsum("kci,kcin->kn", T - alone, tangents[:, sticks])
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
@@ -163,8 +161,7 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
             out[:, shared[0]] += change[:, shared[1]]
         out[:, rows[sticks]] = -T
         if (N[:, sticks] != own).any():
-            which = [frictional[j] for j in sticks]
-            out[:, gaps.rows[which]] = -gaps.sign[which] * N[:, sticks]
+            out[:, gaps.rows[stuck]] = -gaps.sign[stuck] * N[:, sticks]
         if (others != M).any():
             out[:, gaps.rows[smooth]] = -gaps.sign[smooth] * others
     for j, i in enumerate(frictional):

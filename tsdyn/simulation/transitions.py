@@ -54,9 +54,8 @@ class Transitions:
         idle = [i for i in before.idle if self.gap[i] <= low[i]]  # the others have opened
         touching = {*self.near, *hit, *before.closed, *idle}.intersection(self.able)
         slips = [i - count - own for i in fired if i >= count + own]
-        turned, self.broken = list(filter(before.slides, slips)), slips
         broken = [i - count for i in fired if count <= i < count + own]
-        status = self._settle(sorted(touching), hit, broken, turned)
+        status = self._settle(sorted(touching), hit, broken, slips)
         if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status
@@ -108,20 +107,21 @@ class Transitions:
             self.remembered[self.count :][left] = 0.0
         return status
 
-    def _decide_modes(self, touching, fired, broken, turned=()):
+    def _decide_modes(self, touching, fired, broken, slips=()):
         """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
 
-        fired, broken: gaps and frictions whose events have come; turned: gaps whose slips have turned.
+        fired, broken: gaps and frictions whose events have come; slips: gaps whose slips have begun, ended or turned.
         """
         slots, qd = self.remembered[self.count :], self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
+        turned = list(filter(before.slides, slips))
         if not touching:
             return self._decide_frictions(before, broken, self._rounding(before))
         try:
             if len(touching) == 1 and self._bounces(touching[0], before, slots):
                 return None
             near = self._low_flights(touching)
-            inertia = Inertia(self.gaps, self.t, self.q, slots, [*touching, *near], before.closed, broken=self.broken)
+            inertia = Inertia(self.gaps, self.t, self.q, slots, [*touching, *near], before.closed, broken=slips)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies; rates that are
             # rounding of these are of no sign, and no start of a flight
@@ -272,7 +272,7 @@ class Transitions:
             slots, gaps = self.remembered[self.count :].copy(), self._gaps_with(holds)
             for unit in self.frictions.units:
                 slots[unit.way] = 0.0  # their loads are known
-            inertia = Inertia(gaps, self.t, self.q, slots, touching, self.modes.closed, self.friction, self.broken)
+            inertia = Inertia(gaps, self.t, self.q, slots, touching, self.modes.closed, self.friction, unheld.broken)
             dead = [i for i in resting if inertia.G[i, i] <= RANK_TOL * unheld.G[i, i]]  # frictions hold these
             contacts = contact_state(inertia, [i for i in resting if i not in dead], self.qd, leaving)
             a = contacts.accelerations

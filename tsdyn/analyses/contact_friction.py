@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..maths.central_path import MARGIN, deepest, inwards
+from ..maths.central_path import deepest, proportional
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
@@ -640,25 +640,6 @@ def share(static, loads, p):
     ways = np.zeros((p.size, free.shape[1]))
     ways[some] = free
     if np.abs(ways[::3]).max() <= RANK_TOL:
-        return _in_proportion(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p), False
+        T = proportional(static * p[:, 0], loads.reshape(len(p), 3, -1)[:, 1:], p[:, 1:])
+        return np.column_stack([p[:, 0], T]), False
     return deepest(static, p, ways), True
-
-
-def _in_proportion(bounds, slips, p):
-    """The same reactions p (c, 3) with friction in proportion to its bounds (c,) where rows depend.
-
-    slips (c, 2, n): accelerations by unit friction. The least sum of |T|^2 / (mu N) with the same accelerations: a box
-    on a plane that doesn't turn has T / (mu N) alike at all corners. Where one comes near its bound before the others,
-    as at the corner at which a box is pulled, these take over what they can.
-    """
-    weight, rows = np.repeat(np.sqrt(np.maximum(bounds, 0.0)), 2), slips.reshape(2 * len(p), -1)
-    T = weight * least_squares((weight[:, None] * rows).T, p[:, 1:].ravel() @ rows, RANK_TOL)
-    some = np.repeat(bounds > RANK_TOL * bounds.max(), 2)
-    share = np.column_stack([np.ones(some.sum() // 2), (T[some] / weight[some] ** 2).reshape(-1, 2)])  # of the bounds
-    size = np.hypot(*share[:, 1:].T)
-    if size.max(initial=0.0) > 1.0 - MARGIN and np.ptp(size) > EVENT_ERROR:
-        ways = null_space(rows[some].T, RANK_TOL)
-        across = np.reshape(ways / weight[some, None] ** 2, (len(share), 2, ways.shape[1]))
-        shares = np.insert(across, 0, 0.0, axis=1).reshape(share.size, ways.shape[1])
-        T[some] += ways @ inwards(share.ravel(), shares, MARGIN)
-    return np.column_stack([p[:, 0], T.reshape(-1, 2)])

@@ -29,6 +29,7 @@ from ..model.packed import reach_of
 from ..observables.evaluate import ITERATIONS, constraint_arrays
 from ..observables.generalised_forces import applied_loads
 from .contact_problem import NoSolution
+from .friction_shares import FrictionShares
 from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities, within
 from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS, USUAL
 
@@ -169,6 +170,23 @@ class Frictions:
         sizes = np.zeros((len(q), self.count))
         slip_velocities(q, qd, self.table, self.points, self.axes, v, sizes, axes)
         return v.reshape(-1, self.count, 3), sizes, axes.reshape(-1, self.count, 3)
+
+    def slopes(self, q, which):
+        """Rows (k, 3, n) of the slip velocities or rates of units, ground frame, at q (n,)."""
+        spans, found = self.packed.system.bodies, np.zeros((len(which), 3, q.size))
+        for at, size in spans[sorted({*self.ends[which].ravel().tolist()} - {len(spans)})].tolist():
+            v = self.motions(np.tile(q, (size, 1)), np.eye(size, q.size, at))[0]
+            found[..., at : at + size] = v[:, which].transpose(1, 2, 0)
+        return found
+
+    def bases(self, q, which):
+        """Orthonormal directions (k, 3, 3), ground frame, in which units may slide; zeros of those that are fewer."""
+        axes, found = self.motions(q[None], np.zeros((1, q.size)))[2][0], np.zeros((len(which), 3, 3))
+        for each, i in zip(found, which, strict=True):
+            slide = self.units[i].slide
+            own = axes[i][None] if slide in (PIN, GUIDE) else perpendiculars(axes[i]) if slide is PLANE else np.eye(3)
+            each[: len(own)] = own
+        return found
 
     def sizes(self, q, qd, length):
         """What rounding of velocities at q, qd (n,) is a share of (units,): sizes of their terms.
@@ -335,6 +353,7 @@ class FrictionAtRest(NamedTuple):
     blocked: list  # of these, those that others hold
     loads: Any  # normal loads (frictions,)
     rates: dict  # what the event of each that slides begins with: its acceleration, zero within rounding
+    sharing: list  # units at rest that share a load
     limits: dict  # loads, N, up to which a unit has none: of those that stick, and of those that have none
 
 
@@ -372,6 +391,7 @@ class RestProblem:
 
     def __init__(self, place, gaps, packed, rows, bases, t, q, qd, memory, cones=None):
         self.place, self.units, self.rows, self.bases = place, place.frictions.units, rows, bases
+        self.gaps, self.state, self.shares = gaps, (t, q, qd, memory), {}  # of units at rest
         system = _remembering(packed.system, memory)
         _, Phi_q, _, gamma = constraint_arrays(system, q, qd, t)
         mine = np.concatenate([*rows.values(), np.zeros(0, int)])
@@ -543,7 +563,7 @@ class RestProblem:
             along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
             ways[i] = along @ self.bases[i] / np.linalg.norm(along)
         known = {*sticking, *self.light, *(unloaded - self.rows.keys())}
-        return FrictionAtRest(sticking, ways, blocked, N, rates, {i: limits[i] for i in sorted(known)})
+        return FrictionAtRest(sticking, ways, blocked, N, rates, self.sharing, {i: limits[i] for i in sorted(known)})
 
     def _bounded(self, N):
         """Directions of those that slide, by the bounds of these normal loads; None where units have several rows.
@@ -583,18 +603,36 @@ class RestProblem:
         terms = np.abs(self.c) + np.abs(self.G) @ np.abs(x) + np.abs(self.D) @ N
         return LEVEL * (np.abs(self.J) @ np.abs(qdd) + np.abs(self.gamma) + terms)
 
+    def _shared(self, ways, x, N):
+        """Multipliers (3,) of units at rest, ground frame, and normal loads (frictions,), where units share a load."""
+        forces = {i: x[at] @ self.bases[i] for i, at in self.at.items() if i not in ways and i not in self.light}
+        rest, self.sharing = tuple(i for i in forces if not self.is_dead(i)), []
+        if not self.depends:
+            return forces, N
+        if rest not in self.shares:
+            self.shares[rest] = FrictionShares(self.place.frictions, self.gaps, rest, *self.state)
+        self.sharing = self.shares[rest].depending
+        if self.sharing:
+            reactions = self.l + self.L @ x + self.K @ N if self.normals else None
+            given = np.array([forces[i] for i in rest])
+            found, N = self.shares[rest].shared(given, N, self.coupled, reactions)
+            forces |= dict(zip(rest, found, strict=True))
+        return forces, N
+
     def _wrong(self, ways, x, N, a, small, fired):
         """Units that can't be as they are, with the way in which they slide instead; None if they stick."""
-        found = {}
+        found, (forces, N) = {}, self._shared(ways, x, N)
+        if fired.intersection(self.sharing):
+            fired = fired.union(self.sharing)
         for i, at in self.at.items():
             basis, size = self.bases[i], np.linalg.norm(a[at])
             if i in self.light:
                 continue
             if i not in ways:
-                (share, bound), force = self.units[i].bound, np.linalg.norm(x[at])
+                (share, bound), force = self.units[i].bound, np.linalg.norm(forces[i])
                 bound += share * N[self.units[i].load.normal] if share else 0.0
                 if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
-                    found[i] = x[at] @ basis / force
+                    found[i] = forces[i] / force
                 elif self.is_dead(i) and size > max(small[at].max(), self.place.still[i]):  # nothing holds it
                     found[i] = a[at] @ basis / size
                 continue
@@ -662,12 +700,14 @@ class RestProblem:
         """Units that stick by what others hold, or a motor: with rows of their own the reactions wouldn't be unique."""
         free = [i for i in self.rows if i not in ways and i not in self.light]
         own, sticking, idle = self._held(free), [], []
+        self.depends = True  # whether the rows of some may depend on others
         try:  # by the pivots: what is left of each row beside those before
             left = np.diag(np.linalg.cholesky(-self.G[np.ix_(own, own)])) ** 2
-            if not self.pressed.size and (left > RANK_TOL * np.abs(np.diag(self.G)).max(initial=0.0)).all():
-                return idle
+            self.depends = bool((left <= RANK_TOL * np.abs(np.diag(self.G)).max(initial=0.0)).any())
         except np.linalg.LinAlgError:
             pass
+        if not (self.depends or self.pressed.size):
+            return idle
         for i in free:
             pressed = self.pressed[:0] if i in self.engaged else self.pressed
             blocked = self.is_dead(i) or ((sticking or pressed.size) and self._is_blocked(i, sticking, pressed))

@@ -205,6 +205,10 @@ class NormalLoads:
         padded[: len(lam)] = lam
         return self._wrench @ padded[self._rows]
 
+    def changed(self, reactions, lam):
+        """Normal loads (frictions,) of these reactions (frictions, 6) and of more multipliers (rows,)."""
+        return self.loads(reactions + self.reactions(lam[:, None])[..., 0])[0]
+
     def loads(self, reactions):
         """Normal loads (frictions,) of reactions (frictions, 6), and their derivatives by these."""
         out = np.zeros((len(reactions), 7))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..jit.kernels import entry, kernel
 from .dense_linalg import copy, lu, lu_solve
-from .dense_solve import least_squares
+from .dense_solve import least_squares, null_space
 from .tolerances import RANK_TOL
 
 # The first weight, its factor and their number, by which points are right to 1e-11 of the largest reaction, also where
@@ -22,18 +22,28 @@ from .tolerances import RANK_TOL
 # share of the largest reaction
 FIRST, FACTOR, WEIGHTS = 1e1, 1e1, 9
 STEPS, SETTLED, SHORTEST, MARGIN = 30, 1e-9, 1e-9, 0.1
+SAME = 1e-9  # shares of bounds that differ by less are alike
+
+
+@kernel
+def _tangent(u, i):
+    """|T| of point i: u (c, 1 + d) has N, then T."""
+    square = 0.0
+    for j in range(1, u.shape[1]):
+        square += u[i, j] * u[i, j]
+    return math.sqrt(square)
 
 
 @kernel
 def _place(B, start, y, u):
-    """u = u0 + B y (3 c,); the least of u_0 - |(u_1, u_2)|."""
-    least = math.inf
-    for i in range(u.size):
-        u[i] = start[i]
-        for j in range(y.size):
-            u[i] += B[i, j] * y[j]
-    for i in range(0, u.size, 3):
-        least = min(least, u[i] - math.hypot(u[i + 1], u[i + 2]))
+    """u = u0 + B y (c, 1 + d); the least of N - |T|."""
+    least, width = math.inf, u.shape[1]
+    for i in range(u.shape[0]):
+        for k in range(width):
+            u[i, k] = start[i, k]
+            for j in range(y.size):
+                u[i, k] += B[width * i + k, j] * y[j]
+        least = min(least, u[i, 0] - _tangent(u, i))
     return least
 
 
@@ -46,19 +56,19 @@ def _value(B, start, most, weight, y, u):
     value = -0.5 * t * t - weight * t - math.log(most - t)
     for j in range(y.size):
         value += 0.5 * y[j] * y[j]
-    for i in range(0, u.size, 3):
-        T = math.hypot(u[i + 1], u[i + 2])
-        value -= math.log((u[i] - T) * (u[i] + T))
+    for i in range(u.shape[0]):
+        T = _tangent(u, i)
+        value -= math.log((u[i, 0] - T) * (u[i, 0] + T))
     return value
 
 
-@entry("mvdvvvmmw")
+@entry("mmdvvmmmw")
 def follow(B, start, most, y, before, u, work, H, pivots):
     """The minima y (n,) of Eq. (1) at the last weight, and at the one `before`, from a y within the cones.
 
-    B (3 c, n), start (3 c,): scaled, so that mu is one; most: m. Others are scratch.
+    start (c, 1 + d), B (c (1 + d), n): scaled, so that mu is one; most: m. Others are scratch.
     """
-    n, t, weight = y.size, y.size - 1, FIRST
+    n, t, weight, width = y.size, y.size - 1, FIRST, u.shape[1]
     slope, step, trial = work[0], work[1], work[2]
     for _ in range(WEIGHTS):
         copy(y, before)
@@ -71,15 +81,20 @@ def follow(B, start, most, y, before, u, work, H, pivots):
                 for k in range(n):
                     H[j, k] = 1.0 if j == k else 0.0
             slope[t], H[t, t] = weight - rest, rest * rest
-            for i in range(0, u.size, 3):
-                T = math.hypot(u[i + 1], u[i + 2])
-                share = 2.0 / ((u[i] - T) * (u[i] + T))
+            for i in range(u.shape[0]):
+                T, own = _tangent(u, i), B[width * i : width * (i + 1)]
+                share = 2.0 / ((u[i, 0] - T) * (u[i, 0] + T))
                 for j in range(n):
-                    trial[j] = share * (u[i] * B[i, j] - u[i + 1] * B[i + 1, j] - u[i + 2] * B[i + 2, j])
+                    along = u[i, 0] * own[0, j]
+                    for m in range(1, width):
+                        along -= u[i, m] * own[m, j]
+                    trial[j] = share * along
                 for j in range(n):
                     slope[j] += trial[j]
                     for k in range(n):
-                        square = B[i, j] * B[i, k] - B[i + 1, j] * B[i + 1, k] - B[i + 2, j] * B[i + 2, k]
+                        square = own[0, j] * own[0, k]
+                        for m in range(1, width):
+                            square -= own[m, j] * own[m, k]
                         H[j, k] += trial[j] * trial[k] - share * square
             copy(slope, step)
             if not lu(H, pivots, n):
@@ -115,25 +130,52 @@ def deepest(mu, p, ways):
     least = x - ways @ (ways.T @ x)
     across = ways.reshape(-1, 3, k)[:, 1:].reshape(-1, k)
     least = least - ways @ least_squares(across, least.reshape(-1, 3)[:, 1:].ravel(), RANK_TOL)
-    scale = np.column_stack([np.ones(len(p)), 1.0 / mu, 1.0 / mu]).ravel()
-    y = inwards(scale * least, scale[:, None] * ways, MARGIN * np.abs(least).max())
+    scale = np.column_stack([np.ones(len(p)), 1.0 / mu, 1.0 / mu])
+    y = inwards(scale * least.reshape(-1, 3), scale[..., None] * ways.reshape(-1, 3, k), MARGIN * np.abs(least).max())
     return size * (least + ways @ y).reshape(-1, 3)
 
 
-def inwards(u, ways, most):
-    """Shares y (k,) with which u + ways y are as deep in their cones |T| < N as they can; u (3 c,), ways (3 c, k).
+def proportional(bounds, rows, T):
+    """Forces with the same effect as T (c, d), in proportion to their bounds (c,) where their rows (c, d, n) depend.
 
-    They are zero where u are as deep as `most`.
+    The least sum of |T|^2 / b: a box on a plane that doesn't turn has T / b alike at all corners. Where one comes near
+    its bound before the others, as at the corner at which a box is pulled, these take over what they can. rows: what
+    unit forces do; of zeros, nothing.
     """
-    k = ways.shape[1]
-    some = np.repeat(np.abs(ways).reshape(u.size // 3, 3 * k).max(axis=1, initial=0.0) > RANK_TOL, 3)
-    start, B = u[some], np.column_stack([ways, np.tile([-1.0, 0.0, 0.0], u.size // 3)])[some]
-    margin = (start[::3] - np.hypot(start[1::3], start[2::3])).min(initial=most)
+    (c, d), rows = T.shape, rows.reshape(T.size, -1)
+    weight, sizes = np.repeat(np.sqrt(np.maximum(bounds, 0.0)), d), np.linalg.norm(rows, axis=1)
+    found = weight * least_squares((weight[:, None] * rows).T, T.ravel() @ rows, RANK_TOL)
+    able = bounds > RANK_TOL * bounds.max(initial=0.0)
+    share = np.ones((c, 1 + d))  # of the bounds
+    share[able, 1:] = found.reshape(c, d)[able] / bounds[able, None]
+    size = np.linalg.norm(share[able, 1:], axis=1)
+    if size.max(initial=0.0) > 1.0 - MARGIN and np.ptp(size) > SAME:
+        some = np.repeat(able, d) & (sizes > RANK_TOL * sizes.max())
+        ways = np.zeros((T.size, (free := null_space(rows[some].T, RANK_TOL)).shape[1]))
+        ways[some] = free
+        across = np.zeros((c, 1 + d, ways.shape[1]))
+        across[able, 1:] = ways.reshape(c, d, -1)[able] / bounds[able, None, None]
+        found += ways @ inwards(share[able], across[able], MARGIN)
+    return found.reshape(c, d)
+
+
+def inwards(u, ways, most):
+    """Shares y (k,) with which u + ways y are as deep in their cones |T| < N as they can; u (c, 1 + d): N, T.
+
+    ways (c, 1 + d, k). They are zero where u are as deep as `most`.
+    """
+    k, width = ways.shape[2], u.shape[1]
+    some = np.abs(ways).max(axis=(1, 2), initial=0.0) > RANK_TOL
+    start = u[some]
+    margin = (start[:, 0] - np.linalg.norm(start[:, 1:], axis=1)).min(initial=most)
     if margin >= most:
         return np.zeros(k)
+    B = np.zeros((len(start), width, k + 1))
+    B[..., :k], B[:, 0, k] = ways[some], -1.0
     y, n = np.append(np.zeros(k), margin - 1.0), k + 1
-    before, scratch, work, H = np.empty(n), np.empty(start.size), np.empty((3, n)), np.empty((n, n))
-    follow(B, start, most, y, before, scratch, work, H, np.empty(n, np.int64))
+    before, work, H = np.empty(n), np.empty((3, n)), np.empty((n, n))
+    scratch = np.empty_like(start)
+    follow(B.reshape(-1, n), start, most, y, before, scratch, work, H, np.empty(n, np.int64))
     end = (y + (y - before) / (FACTOR - 1.0))[:k]
     part = min(2.0 * (1.0 - margin / most), 1.0)  # of the way: points are continuous
     return part * end

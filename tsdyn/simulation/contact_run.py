@@ -50,6 +50,7 @@ from .phases import Impulse, PhasePieces, Phases, Pinned, UnitModes
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
+from .shared_friction import SharedFriction
 from .termination import reporter, silent
 from .tolerances import PENETRATION
 from .transitions import Transitions
@@ -496,7 +497,8 @@ class _ContactRun(Transitions, Checkpoints):
         sticking = list(modes.sticking)
         light = [i for i in modes.limits if i not in modes.sticking]
         loaded, units = [*sticking, *light], [[frictions.units[i] for i in some] for some in (sticking, light)]
-        breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in loaded])).over
+        shares = SharedFriction(frictions, gaps, modes, packed) if modes.sharing else None
+        breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in loaded]), shares).over
         starting, idle = {}, self._idle_frictions()
         if idle:
             _, rates, paces = self._slip_terms_of_frictions()

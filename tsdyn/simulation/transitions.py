@@ -358,6 +358,7 @@ class Transitions:
         self.modes.sticking = {i: ranks[i] for i in rest.sticking}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
         self.modes.begun, self.modes.limits = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.limits
+        self.modes.sharing = rest.sharing
         if cones is not None:
             self.friction = self._load(packed, rest.loads)
         return None

@@ -122,6 +122,8 @@ class Breaking(KernelFunctions):
     light : list of friction_problem.FrictionUnit
     limits : ndarray (sticking and light units,), N
         Loads that count as none.
+    shares : SharedFriction, optional
+        Of units that share a load. What is left to those without rows of their own counts as that of others.
 
     Attributes
     ----------
@@ -129,8 +131,8 @@ class Breaking(KernelFunctions):
         Rounding of the values.
     """
 
-    def __init__(self, packed, sticking, light, limits):
-        self.packed, self.sticking, self.light, self.limits = packed, sticking, light, limits
+    def __init__(self, packed, sticking, light, limits, shares=None):
+        self.packed, self.sticking, self.light, self.limits, self.shares = packed, sticking, light, limits, shares
         self.noise = REACTION_NOISE * limits * ([unit.bound[0] for unit in sticking] + [1.0] * len(light))
 
     @cached_property
@@ -154,8 +156,29 @@ class Breaking(KernelFunctions):
 
     @property
     def kernel(self):
-        """As of `GroupSearch`; none where laws are called."""
-        return None if calls_laws(self.packed) else self.functions
+        """As of `GroupSearch`; none where laws are called, or units share a load."""
+        return None if self.shares or calls_laws(self.packed) else self.functions
+
+    def over(self, states):
+        """As of `KernelFunctions`."""
+        values = super().over(states)
+        if self.shares is None:
+            return values
+        found = self._workspace.multipliers(states.t, states.levels, states.memory)
+        units, count = self.shares.units, len(self.sticking)
+        own = [self.sticking.index(unit) if unit in self.sticking else -1 for unit in units]
+        limits = np.array(
+            [unit.bound[0] * self.limits[k] if k >= 0 else 0.0 for unit, k in zip(units, own, strict=True)]
+        )
+        values[:, [k for k in own if k >= 0]] = np.inf
+        for k, mine in enumerate(zip(states.t, states.levels, *found, strict=True)):
+            t, levels, lam, N = mine
+            forces, b = self.shares.at(t, levels, states.memory, lam, N)
+            left = (b * b - (forces * forces).sum(axis=1)) / (b + limits + TINY)
+            for j, value in enumerate(left):
+                at = own[j] if own[j] >= 0 else j % count
+                values[k, at] = min(values[k, at], value)
+        return values
 
 
 # Slides of frictions

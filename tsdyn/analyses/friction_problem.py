@@ -610,14 +610,12 @@ class RestProblem:
         if not self.depends:
             return forces, N
         if rest not in self.shares:
-            self.shares[rest] = FrictionShares(self.place.frictions, self.gaps, rest, *self.state)
-        self.sharing = self.shares[rest].depending
-        if self.sharing:
-            reactions = self.l + self.L @ x + self.K @ N if self.normals else None
-            given = np.array([forces[i] for i in rest])
-            found, N = self.shares[rest].shared(given, N, self.coupled, reactions)
-            forces |= dict(zip(rest, found, strict=True))
-        return forces, N
+            self.shares[rest] = FrictionShares(self.place.frictions, self.gaps, list(rest), *self.state)
+        shares = self.shares[rest]
+        self.sharing = shares.depending
+        reactions = self.l + self.L @ x + self.K @ N if self.normals else None
+        found, N, _ = shares.shared(np.array([forces[i] for i in rest]), N, self.coupled, reactions)
+        return forces | dict(zip(rest, found, strict=True)), N
 
     def _wrong(self, ways, x, N, a, small, fired):
         """Units that can't be as they are, with the way in which they slide instead; None if they stick."""

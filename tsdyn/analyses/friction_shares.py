@@ -29,16 +29,17 @@ class FrictionShares:
 
     Attributes
     ----------
+    units : list of friction_problem.FrictionUnit
     depending : list of int
         Those whose multipliers aren't unique.
     """
 
     def __init__(self, frictions, gaps, which, t, q, qd, memory):
-        self.which, units = list(which), [frictions.units[i] for i in which]
-        self.normal = np.array([unit.load.normal for unit in units], int)
-        self.share, self.own = np.array([unit.bound for unit in units]).reshape(-1, 2).T
-        bases = frictions.bases(q, self.which)
-        rows = bases @ frictions.slopes(q, self.which)
+        self.units = [frictions.units[i] for i in which]
+        self.normal = np.array([unit.load.normal for unit in self.units], int)
+        self.share, self.own = np.array([unit.bound for unit in self.units]).reshape(-1, 2).T
+        bases = frictions.bases(q, which)
+        rows = bases @ frictions.slopes(q, which)
         some = rows.any(axis=2)
         found, lam, left = gaps.workspace.solve(t, q, qd, memory, -rows[some])
         found, lam = found[:-1] * gaps.levers(q), lam[:-1]
@@ -54,22 +55,26 @@ class FrictionShares:
         self.rows = np.where(moved[..., None], turn @ rows, 0.0) / self.sizes[..., None]
         ways = np.zeros((*moved.shape, (free := null_space(self.rows[moved].T, RANK_TOL)).shape[1]))
         ways[moved] = free
-        self.depending = [i for i, own in zip(self.which, ways, strict=True) if np.abs(own).max(initial=0.0) > RANK_TOL]
+        self.depending = [i for i, own in zip(which, ways, strict=True) if np.abs(own).max(initial=0.0) > RANK_TOL]
 
     def shared(self, forces, N, coupled, reactions):
-        """Multipliers (c, 3) of all with the same effect as `forces` (c, 3), ground frame, and normal loads.
+        """Multipliers (c, 3) of all with the same effect as `forces` (c, 3), ground frame; normal loads with these.
 
-        N (frictions,), reactions (frictions, 6): with these; coupled: the `NormalLoads`, if there are any.
+        And by how much these change the multipliers (rows,) of bilateral rows. N (frictions,), reactions (frictions,
+        6): with `forces`; coupled: the `NormalLoads`, if there are any.
         """
-        T = np.einsum("ijk,ik->ij", self.bases, forces) * self.sizes
+        T, change = np.einsum("ijk,ik->ij", self.bases, forces) * self.sizes, np.zeros(self.lam.shape[2])
+        if not self.depending:
+            return forces, N, change
         for _ in range(ITERATIONS):
             found = proportional(self.bounds(N) * self.sizes[:, 0], self.rows, T)
+            change = np.einsum("ij,ijk->k", (found - T) / self.sizes, self.lam)
             if not N.size:
                 break
-            before, N = N, coupled.changed(reactions, np.einsum("ij,ijk->k", (found - T) / self.sizes, self.lam))
+            before, N = N, coupled.changed(reactions, change)
             if not (np.abs(N - before) > LEVEL * np.abs(N).max()).any():
                 break
-        return np.einsum("ijk,ij->ik", self.bases, found / self.sizes), N
+        return np.einsum("ijk,ij->ik", self.bases, found / self.sizes), N, change
 
     def bounds(self, N):
         """The largest multipliers (c,) at rest, by normal loads (frictions,)."""

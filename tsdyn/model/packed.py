@@ -106,6 +106,7 @@ class Derived:
     loads: dict = None  # reactions.loads_of
     holds: dict = field(default_factory=dict)  # of a phase, phase_scenes.phase_of: slot of a friction -> rows that hold
     places: dict = field(default_factory=dict)  # it; and index of such a row's primitive -> slots, and where they are
+    shares: object = None  # of a phase in which frictions at rest share a load: a shared_friction.SharedFriction
     row_parts: list = field(default_factory=list)  # idle: reactions.taken
     reactions: dict = field(default_factory=dict)  # of each thread: contact_rows.reaction_workspace
     with_singular_places: list = None  # indices of primitives: reactions.singular_place
@@ -143,7 +144,7 @@ class Derived:
         return _of, tuple(getattr(self, name) for name in KEPT)
 
 
-KEPT = "redundant", "switched", "turning", "handles", "holds", "places"
+KEPT = "redundant", "switched", "turning", "handles", "holds", "places", "shares"
 
 
 def _of(*kept):

@@ -213,7 +213,11 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     system, f = with_short_rows(packed), applied_loads(packed.system, t, q, qd, memory)
     f += velocity_forces(system, q, qd)
     f -= inertial_forces(system, q, qdd)
-    return balancing(packed, t, q, f, memory)
+    lam, shares = balancing(packed, t, q, f, memory), packed.derived.shares
+    if shares is None:
+        return lam
+    slots = packed.system.memory.size
+    return shares.multipliers(packed, t, q, qd, memory[:, :slots], lam, memory[:, slots:])
 
 
 def balancing(packed, t, q, f, memory=None):

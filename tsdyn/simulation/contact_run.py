@@ -424,8 +424,12 @@ class _ContactRun(Transitions, Checkpoints):
         return self._phase_of_modes()
 
     def _phase_of_modes(self, every=()):
-        holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
-        return self._scene_of(self._items(), holds, every)
+        ranks = self.modes.sticking if every else {**self.modes.sharing, **self.modes.sticking}
+        holds = [self._hold(i, rank) for i, rank in ranks.items()]
+        phase = self._scene_of(self._items(), holds, every)
+        if self.modes.sharing:
+            phase.packed.derived.shares = SharedFriction(self.frictions, self.gaps)
+        return phase
 
     def holds(self):
         """Whether each friction sticks, or is held by what sticks."""
@@ -497,7 +501,7 @@ class _ContactRun(Transitions, Checkpoints):
         sticking = list(modes.sticking)
         light = [i for i in modes.limits if i not in modes.sticking]
         loaded, units = [*sticking, *light], [[frictions.units[i] for i in some] for some in (sticking, light)]
-        shares = SharedFriction(frictions, gaps, modes, packed) if modes.sharing else None
+        shares = packed.derived.shares if modes.sharing else None
         breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in loaded]), shares).over
         starting, idle = {}, self._idle_frictions()
         if idle:

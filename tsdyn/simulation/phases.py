@@ -29,7 +29,7 @@ class UnitModes:
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
-    sharing: list = field(default_factory=list)  # frictions at rest that share a load
+    sharing: dict = field(default_factory=dict)  # those at rest that share a load: how many rows hold each, or could
     limits: dict = field(default_factory=dict)  # loads that count as none: of frictions that stick, and that have none
     grips: dict = field(
         default_factory=dict

@@ -5,47 +5,66 @@ import numpy as np
 from ..analyses.friction_problem import gradients
 from ..analyses.friction_shares import FrictionShares
 from ..analyses.friction_units import normal_loads_of
+from ..maths.dense_solve import least_squares
+from ..maths.tolerances import RANK_TOL
 
 
 class SharedFriction:
-    """What frictions at rest that share a load exert in a phase, whose rows give it to some of them.
+    """What frictions at rest exert that share a load, where the rows of a phase give it to some of them.
 
     Parameters
     ----------
     frictions : friction_problem.Frictions
     gaps : contact_problem.Gaps
         Of the scene.
-    modes : UnitModes
-    packed : Packed
-        Of the phase.
-
-    Attributes
-    ----------
-    units : list of friction_problem.FrictionUnit
-        These frictions.
     """
 
-    def __init__(self, frictions, gaps, modes, packed):
-        self.frictions, self.gaps, self.packed, self._which = frictions, gaps, packed, modes.sharing
-        self.units = [frictions.units[i] for i in self._which]
-        self._ranks = [modes.sticking.get(i, 0) for i in self._which]
+    def __init__(self, frictions, gaps):
+        self.frictions, self.gaps = frictions, gaps
 
-    def at(self, t, levels, memory, lam, N):
-        """Multipliers (c, 3) of these, ground frame, and their bounds (c,).
+    def at(self, packed, t, q, qd, memory, lam, N):
+        """The `FrictionShares` at one state, rows and multipliers (3,), ground frame, of each unit; the loads.
 
-        levels (3, n), memory (slots,): the state; lam (m,), N: multipliers and loads there, by the rows of the phase.
+        packed: of the phase; memory (slots,), by which frictions are at rest; lam (m,), N (frictions,): multipliers and
+        normal loads, by the rows of the phase. The shares are followed by the change of the multipliers of bilateral
+        rows.
         """
-        q, qd, frictions = levels[0], levels[1], self.frictions
-        place, forces = frictions.at(q, np.ones(frictions.count), 0.0), np.zeros((len(self.units), 3))
-        for own, i, unit, rank in zip(forces, self._which, self.units, self._ranks, strict=True):
-            if rank:
-                numbers = memory[np.array([unit.held(k) for k in range(rank)])]
-                rows = self.packed.derived.holds[unit.slot][:rank]
-                own[:] = lam[rows] @ place.directions(i, numbers)
+        frictions, held = self.frictions, self._held(packed, memory)
+        place, directions, forces = frictions.at(q, np.ones(frictions.count), 0.0), [], np.zeros((len(held), 3))
+        for own, (i, rows) in zip(forces, held.items(), strict=True):
+            numbers = memory[np.array([frictions.units[i].held(k) for k in range(len(rows))])]
+            directions.append(place.directions(i, numbers))
+            own[:] = lam[rows] @ directions[-1]
         coupled = reactions = None
         if N.size:
-            coupled = normal_loads_of(self.packed, t, q, qd, memory, gradients(self.packed, t, q, memory))
+            coupled = normal_loads_of(packed, t, q, qd, memory, gradients(packed, t, q, memory))
             reactions = coupled.reactions(lam[:, None])[..., 0]
-        shares = FrictionShares(frictions, self.gaps, self._which, t, q, qd, memory)
-        forces, N = shares.shared(forces, N, coupled, reactions)
-        return forces, shares.bounds(N)
+        shares = FrictionShares(frictions, self.gaps, list(held), t, q, qd, memory)
+        forces, N, change = shares.shared(forces, N, coupled, reactions)
+        return shares, forces, N, change, zip(held.values(), directions, strict=True)
+
+    def _held(self, packed, memory):
+        """Rows of the frictions that are at rest, by their units: the memory has numbers of these."""
+        held = {}
+        for i, unit in enumerate(self.frictions.units):
+            rows = packed.derived.holds.get(unit.slot, ())
+            rank = sum(bool(memory[unit.held(k)].any()) for k in range(len(rows)))
+            if rank:
+                held[i] = rows[:rank]
+        return held
+
+    def multipliers(self, packed, t, q, qd, memory, lam, N):
+        """Multipliers (k, m) in which frictions share their loads, of those by the rows of a phase.
+
+        t (k,), q, qd (k, n), memory (k, slots), N (k, frictions).
+        """
+        out = lam.copy()
+        for k, own in enumerate(out):
+            if len(self._held(packed, memory[k])) < 2 or not np.isfinite(N[k]).all():
+                continue
+            given = np.nan_to_num(lam[k])
+            _, forces, _, change, places = self.at(packed, t[k], q[k], qd[k], memory[k], given, N[k])
+            own[: change.size] += change
+            for (rows, directions), force in zip(places, forces, strict=True):
+                own[rows] = least_squares(directions.T, force, RANK_TOL)
+        return out

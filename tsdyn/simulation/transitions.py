@@ -100,7 +100,8 @@ class Transitions:
         if not self.frictions.count:
             return status
         memory, held = self.remembered[self.count :], self.frictions.held
-        ranks = [self.modes.sticking.get(i, 0) for i in range(self.frictions.count)]
+        known = {**self.modes.sharing, **self.modes.sticking}
+        ranks = [known.get(i, 0) for i in range(self.frictions.count)]
         left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]
         if memory[left].any():
             self.remembered = self.remembered.copy()
@@ -358,7 +359,7 @@ class Transitions:
         self.modes.sticking = {i: ranks[i] for i in rest.sticking}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
         self.modes.begun, self.modes.limits = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.limits
-        self.modes.sharing = rest.sharing
+        self.modes.sharing = {i: ranks[i] for i in rest.sharing}
         if cones is not None:
             self.friction = self._load(packed, rest.loads)
         return None

@@ -122,8 +122,8 @@ class Breaking(KernelFunctions):
     light : list of friction_problem.FrictionUnit
     limits : ndarray (sticking and light units,), N
         Loads that count as none.
-    shares : SharedFriction, optional
-        Of units that share a load. What is left to those without rows of their own counts as that of others.
+    shares : shared_friction.SharedFriction, optional
+        Where units share a load. What is left to those without rows of their own counts as that of others.
 
     Attributes
     ----------
@@ -165,19 +165,17 @@ class Breaking(KernelFunctions):
         if self.shares is None:
             return values
         found = self._workspace.multipliers(states.t, states.levels, states.memory)
-        units, count = self.shares.units, len(self.sticking)
-        own = [self.sticking.index(unit) if unit in self.sticking else -1 for unit in units]
-        limits = np.array(
-            [unit.bound[0] * self.limits[k] if k >= 0 else 0.0 for unit, k in zip(units, own, strict=True)]
-        )
-        values[:, [k for k in own if k >= 0]] = np.inf
-        for k, mine in enumerate(zip(states.t, states.levels, *found, strict=True)):
-            t, levels, lam, N = mine
-            forces, b = self.shares.at(t, levels, states.memory, lam, N)
+        places = {unit.slot: k for k, unit in enumerate(self.sticking)}
+        for value, t, (q, qd, _), lam, N in zip(values, states.t, states.levels, *found, strict=True):
+            shares, forces, N, *_ = self.shares.at(self.packed, t, q, qd, states.memory, lam, N)
+            b = shares.bounds(N)
+            at = [places.get(unit.slot, -1) for unit in shares.units]
+            limits = np.append(self.limits, 0.0)[at] * shares.share
             left = (b * b - (forces * forces).sum(axis=1)) / (b + limits + TINY)
-            for j, value in enumerate(left):
-                at = own[j] if own[j] >= 0 else j % count
-                values[k, at] = min(values[k, at], value)
+            own = np.array(at) >= 0
+            value[np.array(at)[own]] = left[own]
+            for j, least in enumerate(left[~own]):
+                value[j % len(places)] = min(value[j % len(places)], least)
         return values
 
 

@@ -21,7 +21,7 @@ from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..jit.kernels import twin
-from ..maths.complementarity import OPEN, STICKS
+from ..maths.complementarity import OPEN, SLIDES, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
@@ -350,7 +350,8 @@ class FrictionAtRest(NamedTuple):
 
     sticking: list  # units whose rows hold
     ways: dict  # direction (3,), ground frame, of each that slides
-    blocked: list  # of these, those that others hold
+    turning: set  # of these, those whose direction turns with the slip as it begins
+    blocked: list  # and those that others hold
     loads: Any  # normal loads (frictions,)
     rates: dict  # what the event of each that slides begins with: its acceleration, zero within rounding
     sharing: list  # units at rest that share a load
@@ -468,10 +469,8 @@ class RestProblem:
         """
         (x, P), pushing, N = self._sliding(ways), self.pushing, self.normal_loads
         balls = [i for i in ways if len(self.at[i]) > 1]
-        # Three rows of each; -1 for one that a unit doesn't have
-        u = np.concatenate([pushing, *(np.append(self.at[i], -np.ones(3 - len(self.at[i]), int)) for i in balls)])
+        u, pushes = self._padded(balls)
         acts, count = u >= 0, len(pushing) // 3
-        pushes = np.where(np.isin(u, pushing), 1.0, -1.0) * acts
         G, across = self.G[np.ix_(u, u)] * acts[:, None] * pushes, self.G[np.ix_(u, stick)] * acts[:, None]
         by_u = least_squares(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, u)] * pushes, RANK_TOL**2)
         alone, G = np.diag(G), G - product(across, by_u)
@@ -538,12 +537,15 @@ class RestProblem:
                     return self._found(ways, N, a, small, (unloaded, limits))
                 self.light ^= others
                 judged |= others
+                guessed = False
                 ways = {i: way for i, way in ways.items() if i not in self.light}
                 continue
             known = tuple((i, *np.sign(np.round(d, 3))) for i, d in sorted(ways.items()))
-            if known in seen and (guess := self._bounded(N)) and not guessed:
-                ways, guessed = guess, True
-                continue
+            if not guessed and (known in seen or (count and any(len(self.at[i]) > 1 for i in wrong))):
+                guessed = True
+                if guess := self._bounded(N, fired):
+                    ways = guess
+                    continue
             one_by_one = known in seen or count >= PIVOTS
             seen.add(known)
             for i in sorted(wrong)[: 1 if one_by_one else None]:
@@ -563,31 +565,52 @@ class RestProblem:
             along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
             ways[i] = along @ self.bases[i] / np.linalg.norm(along)
         known = {*sticking, *self.light, *(unloaded - self.rows.keys())}
-        return FrictionAtRest(sticking, ways, blocked, N, rates, self.sharing, {i: limits[i] for i in sorted(known)})
+        # The slip of what begins without an acceleration is no more than time after time squared
+        turning = {i for i in ways if not (self.place.frictions.signed[i] or i in self.light or self.is_dead(i))}
+        rates = {i: rate for i, rate in rates.items() if rate or i not in turning}
+        limits = {i: limits[i] for i in sorted(known)}
+        return FrictionAtRest(sticking, ways, turning, blocked, N, rates, self.sharing, limits)
 
-    def _bounded(self, N):
-        """Directions of those that slide, by the bounds of these normal loads; None where units have several rows.
+    def _bounded(self, N, fired):
+        """Directions of the units that slide, by the bounds of normal loads, from N on: where pivoting goes round.
 
-        x minimises x.H x / 2 - c.x within |x| <= mu N, H = -G: where pivoting goes round, as along a chain.
+        For given bounds |x| <= b is a problem with cones, beside contacts or not; those that reach b slide by the
+        kinetic coefficient. None where no solution was found.
         """
-        from scipy.linalg import LinAlgError, cholesky, solve_triangular
-        from scipy.optimize import lsq_linear
+        which = [i for i in self.rows if i not in self.light and not self.is_dead(i)]
+        units, (u, sign), first = [self.units[i] for i in which], self._padded(which), len(self.pushing) // 3
+        acts, x, slid = sign != 0.0, np.zeros(len(self.c)), np.zeros(len(which), bool)
+        G, reached = (
+            self.G[np.ix_(u, u)] * np.outer(acts, sign),
+            np.where(np.isin(which, list(fired)), 1.0 - LEVEL, 1.0),
+        )
+        normal = np.array([own.load.normal for own in units], int)
+        static, kinetic = np.array([(own.bound, own.sliding) for own in units]).reshape(-1, 2, 2).T.swapaxes(0, 1)
+        for _ in range(ITERATIONS):
+            loads = np.append(N, 0.0)[normal]
+            rest, slides = reached * (static[0] * loads + static[1]), kinetic[0] * loads + kinetic[1]
+            bounds = np.where(slid & (slides < rest), slides, rest)
+            left = (self.c + self.D @ N)[u] * acts
+            if self.cones is not None:
+                p, mode, _ = self.cones.solve(G, left, bounds)
+            else:
+                p, mode = solve_cone(G, left, np.zeros(0), bounds=bounds)
+            if p is None:
+                return None
+            x[u[acts]], before, more = (sign * p)[acts], N, (mode[first:] == SLIDES) & ~slid
+            if self.normals:
+                N = self.coupled.loads(self.l + self.L @ x + self.K @ N)[0]
+            if not (more.any() or (np.abs(N - before) > LEVEL * np.abs(N).max(initial=0.0)).any()):
+                break
+            slid |= more
+        forces = {i: x[self.at[i]] @ self.bases[i] for i, slides in zip(which, slid, strict=True) if slides}
+        return {i: force / np.linalg.norm(force) for i, force in forces.items() if force.any()}
 
-        units = [i for i in self.rows if i not in self.idle and i not in self.light]
-        at = self._held(units)
-        if len(at) > len(units) or self.cones is not None:
-            return None
-        try:
-            R = cholesky(-self.G[np.ix_(at, at)])
-        except LinAlgError:
-            return None
-        pairs = [self.units[i].bound for i in units]
-        loads = [N[self.units[i].load.normal] if share else 0.0 for i, (share, _) in zip(units, pairs, strict=True)]
-        bounds = np.maximum([share * load + own for load, (share, own) in zip(loads, pairs, strict=True)], TINY)
-        c = solve_triangular(R, (self.c + self.D @ N)[at], trans="T")
-        x = lsq_linear(R, c, (-bounds, bounds), method="bvls", tol=TINY).x
-        slides = zip(units, x, np.abs(x) >= bounds * (1.0 - LEVEL), strict=True)
-        return {i: np.sign(one) * self.bases[i][0] for i, one, beyond in slides if beyond}
+    def _padded(self, units):
+        """Three rows (3 k,) of each contact and each of some units, -1 for what one doesn't have; signs, or zero."""
+        rows = [np.append(self.at[i], -np.ones(3 - len(self.at[i]), int)) for i in units]
+        u = np.concatenate([self.pushing, *rows])
+        return u, np.where(np.arange(u.size) < len(self.pushing), 1.0, -1.0) * (u >= 0)
 
     def _unloaded(self, x, N):
         """Units whose normal loads are small beside what acts on their bodies; up to which loads (units,)."""
@@ -607,7 +630,7 @@ class RestProblem:
         """Multipliers (3,) of units at rest, ground frame, and normal loads (frictions,), where units share a load."""
         forces = {i: x[at] @ self.bases[i] for i, at in self.at.items() if i not in ways and i not in self.light}
         rest, self.sharing = tuple(i for i in forces if not self.is_dead(i)), []
-        if not self.depends:
+        if not self.depends or len(rest) < 2:
             return forces, N
         if rest not in self.shares:
             self.shares[rest] = FrictionShares(self.place.frictions, self.gaps, list(rest), *self.state)
@@ -621,7 +644,7 @@ class RestProblem:
         """Units that can't be as they are, with the way in which they slide instead; None if they stick."""
         found, (forces, N) = {}, self._shared(ways, x, N)
         if fired.intersection(self.sharing):
-            fired = fired.union(self.sharing)
+            fired.update(self.sharing)
         for i, at in self.at.items():
             basis, size = self.bases[i], np.linalg.norm(a[at])
             if i in self.light:
@@ -634,10 +657,11 @@ class RestProblem:
                 elif self.is_dead(i) and size > max(small[at].max(), self.place.still[i]):  # nothing holds it
                     found[i] = a[at] @ basis / size
                 continue
-            along = a[at] @ basis @ ways[i]
-            if along < -small[at].max():
+            along, least = a[at] @ basis @ ways[i], small[at].max()
+            across = np.linalg.norm(a[at] @ basis - along * ways[i])
+            if along < -least:
                 found[i] = None
-            elif len(at) > 1 and size > small[at].max() and along < size * (1.0 - NEGLIGIBLE):
+            elif across > max(least, np.sqrt(2.0 * NEGLIGIBLE) * size):
                 found[i] = a[at] @ basis / size
         return found
 

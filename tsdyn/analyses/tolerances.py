@@ -152,6 +152,8 @@ JUST_OPENED = 1.0 / 14.0
 # A body that slides in a plane, more slowly than STOPPED, has come to rest where its direction turns: ten times the
 # velocity below which its direction is kept.
 USUAL, STOPPED = 3.0, 1e-8
+# Over SLIP of elements: below this friction keeps its direction where slip begins, as AHEAD has it of contacts.
+KEPT_WAY = 300.0
 # Roundings of the time within which an acceleration changes velocities by none: an event's time is right to some ten.
 RESTS = 100.0
 # Rounds of pivoting over those for all units at once; after as many, or where modes come back, one unit at a time. Also

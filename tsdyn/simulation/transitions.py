@@ -7,7 +7,7 @@ import numpy as np
 from ..analyses.contact_friction import Cones, at_turn, halted, solve_rough_contacts
 from ..analyses.contact_problem import Inertia, NoSolution, solve_contacts
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, gradients, values_of
-from ..analyses.tolerances import EVENT_ERROR, LEVEL, PIVOTS, RESTS, STOPPED
+from ..analyses.tolerances import EVENT_ERROR, KEPT_WAY, LEVEL, PIVOTS, RESTS, STOPPED
 from ..elements.bodies import largest_of_kind
 from ..errors import (
     SingularConfiguration,
@@ -355,10 +355,13 @@ class Transitions:
             self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         for i, way in rest.ways.items():
-            memory[frictions.units[i].way] = place.written(i, way)
+            memory[frictions.units[i].way] = place.written(i, way) * (KEPT_WAY if i in rest.turning else 1.0)
         self.modes.sticking = {i: ranks[i] for i in rest.sticking}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
-        self.modes.begun, self.modes.limits = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.limits
+        self.modes.begun, self.modes.limits = (
+            {i: (self.t, rate) for i, rate in rest.rates.items() if rate or frictions.signed[i]},
+            rest.limits,
+        )
         self.modes.sharing = {i: ranks[i] for i in rest.sharing}
         if cones is not None:
             self.friction = self._load(packed, rest.loads)

@@ -167,6 +167,9 @@ class Breaking(KernelFunctions):
         found = self._workspace.multipliers(states.t, states.levels, states.memory)
         places = {unit.slot: k for k, unit in enumerate(self.sticking)}
         for value, t, (q, qd, _), lam, N in zip(values, states.t, states.levels, *found, strict=True):
+            if not (np.isfinite(lam).all() and np.isfinite(N).all()):  # at singular configurations
+                value[:] = np.nan
+                continue
             shares, forces, N, *_ = self.shares.at(self.packed, t, q, qd, states.memory, lam, N)
             b = shares.bounds(N)
             at = [places.get(unit.slot, -1) for unit in shares.units]

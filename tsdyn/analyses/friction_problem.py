@@ -355,6 +355,7 @@ class FrictionAtRest(NamedTuple):
     loads: Any  # normal loads (frictions,)
     rates: dict  # what the event of each that slides begins with: its acceleration, zero within rounding
     sharing: list  # units at rest that share a load
+    partial: dict  # of those that stick some that others hold in some directions: `RestProblem._partial`
     limits: dict  # loads, N, up to which a unit has none: of those that stick, and of those that have none
 
 
@@ -568,8 +569,22 @@ class RestProblem:
         # The slip of what begins without an acceleration is no more than time after time squared
         turning = {i for i in ways if not (self.place.frictions.signed[i] or i in self.light or self.is_dead(i))}
         rates = {i: rate for i, rate in rates.items() if rate or i not in turning}
-        limits = {i: limits[i] for i in sorted(known)}
-        return FrictionAtRest(sticking, ways, turning, blocked, N, rates, self.sharing, limits)
+        limits, partial = {i: limits[i] for i in sorted(known)}, self._partial(sticking) if self.sharing else {}
+        return FrictionAtRest(sticking, ways, turning, blocked, N, rates, self.sharing, partial, limits)
+
+    def _partial(self, sticking):
+        """Of units that others hold in some directions: how many these leave, and directions, those first."""
+        found, columns, eye = {}, np.zeros((len(self.c), 0)), np.eye(len(self.c))
+        for i in sticking:
+            own = eye[:, self.at[i]]
+            across = columns.T @ self.G @ own
+            left = across.T @ least_squares(columns.T @ self.G @ columns, across, RANK_TOL**2) - own.T @ self.G @ own
+            size, ways = np.linalg.eigh(left)
+            ways, rank = ways[:, ::-1], int((size > RANK_TOL * np.abs(np.diag(self.G)[self.at[i]]).max()).sum())
+            columns = np.hstack([columns, own @ ways[:, :rank]])
+            if rank < len(size):
+                found[i] = rank, ways.T @ self.bases[i]
+        return found
 
     def _bounded(self, N, fired):
         """Directions of the units that slide, by the bounds of normal loads, from N on: where pivoting goes round.

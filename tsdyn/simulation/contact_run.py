@@ -132,7 +132,8 @@ class _ContactRun(Transitions, Checkpoints):
         start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         # Whether phases of frictions that stick and slide are packed once, with the rows of all: see `phase_of`
-        self.switches = run_task is not None and free.packed.derived.redundant is None
+        self.regular = free.packed.derived.redundant is None
+        self.switches = run_task is not None and self.regular
         apart, length = self.gaps.at(self.q, self.remembered[: self.count]), self.gaps.extent(self.q)
         demand_apart(self.gaps, apart, length, options.initial_tol, self.able)
         self.length = max(length, np.abs(apart[self.gaps.lengths(0.0) == 0.0]).max(initial=0.0))
@@ -416,7 +417,7 @@ class _ContactRun(Transitions, Checkpoints):
 
     def _scene(self, tol=None):
         """The scene of the present modes; tol: as of `_tol`, by default of the present velocities."""
-        if self.switches and self.every and not self.modes.grips:
+        if self.every and ((self.modes.sharing and self.regular) or (self.switches and not self.modes.grips)):
             phase, start = self._phase_of_modes(self.every), (self.q, self.qd)
             with suppress(DependentRows):
                 prepared(phase).start(phase, start, self.t, tol or self._tol(), self.remembered, True)
@@ -424,8 +425,7 @@ class _ContactRun(Transitions, Checkpoints):
         return self._phase_of_modes()
 
     def _phase_of_modes(self, every=()):
-        ranks = self.modes.sticking if every else {**self.modes.sharing, **self.modes.sticking}
-        holds = [self._hold(i, rank) for i, rank in ranks.items()]
+        holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
         phase = self._scene_of(self._items(), holds, every)
         if self.modes.sharing:
             phase.packed.derived.shares = SharedFriction(self.frictions, self.gaps)

@@ -100,7 +100,7 @@ class Transitions:
         if not self.frictions.count:
             return status
         memory, held = self.remembered[self.count :], self.frictions.held
-        known = {**self.modes.sharing, **self.modes.sticking}
+        known = {**self.modes.sticking, **self.modes.sharing}
         ranks = [known.get(i, 0) for i in range(self.frictions.count)]
         left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]
         if memory[left].any():
@@ -356,7 +356,7 @@ class Transitions:
             return Status.CONTACT_FAILED
         for i, way in rest.ways.items():
             memory[frictions.units[i].way] = place.written(i, way) * (KEPT_WAY if i in rest.turning else 1.0)
-        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
+        self.modes.sticking = {i: rest.partial.get(i, (ranks[i],))[0] for i in rest.sticking}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
         self.modes.begun, self.modes.limits = (
             {i: (self.t, rate) for i, rate in rest.rates.items() if rate or frictions.signed[i]},
@@ -386,26 +386,23 @@ class Transitions:
     def _rest(self, place, before, resting, guesses, fired, cones):
         """The `FrictionAtRest`, how many rows hold each at rest, and the packed phase with open contacts."""
         units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
+        finders = partial(self._motions_of, place), partial(self._mobility, place)
         for i in resting:
-            ranks[i] = before.sticking.get(i, -1)
+            ranks[i] = -1 if i in before.sharing else before.sticking.get(i, -1)
             if ranks[i] < 0:
-                basis = place.basis(i, partial(self._motions_of, place), partial(self._mobility, place))
-                ranks[i] = len(basis)
-                for k, numbers in enumerate(place.numbers(i, basis)):
-                    memory[np.array(units[i].held(k))] = numbers
+                ranks[i] = self._write_rows(place, i, place.basis(i, *finders))
         free = [i for i in resting if ranks[i]]
         phase = self._scene_of([], self.every, self.every)  # rows of those that slide don't count: it is packed once
         rows = {i: phase.packed.derived.holds[units[i].slot][: ranks[i]] for i in free}
         fresh = [i for i in free if i not in before.sticking]
-        if fresh:  # their rows hold to the last bit where they are
-            Phi = values_of(phase.packed, self.t, self.q, memory)
-            for i in fresh:
-                for k, row in enumerate(rows[i]):
-                    memory[units[i].held(k)[-1]] = Phi[row]
+        self._hold_here(phase.packed, {i: rows[i] for i in free if i in fresh or i in before.sharing})
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
         problem = RestProblem(place, self.gaps, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         guess, turned = ({i: way for i, way in each.items() if i in free} for each in guesses)
         rest = problem.pivot(guess, fired, turned)
+        for i, (_, basis) in rest.partial.items():
+            self._write_rows(place, i, basis)
+        self._hold_here(phase.packed, {i: rows[i] for i in rest.partial})
         # In a plane slips end where they are slow; elsewhere where they are more than a start may leave
         ends = [i for i in rest.sticking if i in fresh and not self.frictions.signed[i]]
         if problem.slip([i for i in rest.sticking if i in fresh], self.qd) > 0.5 * self.options.initial_tol:
@@ -414,6 +411,23 @@ class Transitions:
             self.rest = max(self.rest, self.t + problem.stopping_time(ends, self.qd))
         self.qd = problem.stopped(ends, self.qd)
         return rest, ranks, phase.packed
+
+    def _write_rows(self, place, i, basis):
+        """Have rows that hold a friction in directions (r, 3) among what the run remembers; their number."""
+        memory, unit = self.remembered[self.count :], self.frictions.units[i]
+        for k, numbers in enumerate(place.numbers(i, basis)):
+            memory[np.array(unit.held(k))] = numbers
+        return len(basis)
+
+    def _hold_here(self, packed, rows):
+        """Have rows (r,) of frictions, by units, hold to the last bit where they are."""
+        if not rows:
+            return
+        memory = self.remembered[self.count :]
+        Phi = values_of(packed, self.t, self.q, memory)
+        for i, own in rows.items():
+            for k, row in enumerate(own):
+                memory[self.frictions.units[i].held(k)[-1]] = Phi[row]
 
     def _mobility(self, place, i, basis):
         """Accelerations (r, r) of a friction along directions (r, 3) by unit forces where bilateral rows hold."""

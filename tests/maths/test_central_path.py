@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tsdyn.maths.central_path import MARGIN, deepest
+from tsdyn.maths.central_path import MARGIN, deepest, proportional
 
 
 def test_two_cones_that_brace_each_other_share_the_margin():
@@ -31,3 +31,22 @@ def test_points_beyond_all_cones_stay_finite():
     mu, way = np.array([1.0, 1.0]), np.array([1.0, 0.0, 0.0, -1.0, 0.0, 0.0]) / np.sqrt(2.0)
     p = np.array([[1.5, 2.0, 0.0], [0.5, 2.0, 0.0]])
     np.testing.assert_allclose(deepest(mu, p, way[:, None])[:, 0], 1.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_forces_along_one_line_are_in_proportion_to_their_bounds(d):
+    """Of three forces in d directions, the first two with the same effect; the third alone in its own."""
+    effect = np.zeros((3, d, 2 * d))
+    effect[0, :, :d] = effect[1, :, :d] = effect[2, :, d:] = np.eye(d)
+    T = np.arange(3.0 * d).reshape(3, d) - 1.0
+    found, total = proportional(np.array([1.0, 3.0, 2.0]), effect, T), T[0] + T[1]
+    np.testing.assert_allclose(found, [0.25 * total, 0.75 * total, T[2]], atol=1e-13)
+
+
+def test_a_force_near_its_bound_is_relieved_by_others():
+    """Forces (x, 1, x + 1.5) across a rod: in proportion 0.917 of the last bound, at best 0.75, where x = -0.75."""
+    effect = np.array([(1.0, -1.0), (1.0, 0.0), (1.0, 1.0)])[:, None]
+    T, bounds = np.array([[-0.25], [0.0], [1.25]]), np.array([1.0, 4.0, 1.0])
+    found = proportional(bounds, effect, T)
+    np.testing.assert_allclose(found.ravel() @ effect[:, 0], T.ravel() @ effect[:, 0], atol=1e-12)
+    assert 0.75 < found[2, 0] < 0.9

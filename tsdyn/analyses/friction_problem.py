@@ -593,12 +593,10 @@ class RestProblem:
         kinetic coefficient. None where no solution was found.
         """
         which = [i for i in self.rows if i not in self.light and not self.is_dead(i)]
-        units, (u, sign), first = [self.units[i] for i in which], self._padded(which), len(self.pushing) // 3
+        units, first, (u, sign) = [self.units[i] for i in which], len(self.pushing) // 3, self._padded(which)
         acts, x, slid = sign != 0.0, np.zeros(len(self.c)), np.zeros(len(which), bool)
-        G, reached = (
-            self.G[np.ix_(u, u)] * np.outer(acts, sign),
-            np.where(np.isin(which, list(fired)), 1.0 - LEVEL, 1.0),
-        )
+        G = self.G[np.ix_(u, u)] * np.outer(acts, sign)
+        reached = np.where(np.isin(which, list(fired)), 1.0 - LEVEL, 1.0)  # so they slide, whatever rounding says
         normal = np.array([own.load.normal for own in units], int)
         static, kinetic = np.array([(own.bound, own.sliding) for own in units]).reshape(-1, 2, 2).T.swapaxes(0, 1)
         for _ in range(ITERATIONS):
@@ -658,7 +656,7 @@ class RestProblem:
     def _wrong(self, ways, x, N, a, small, fired):
         """Units that can't be as they are, with the way in which they slide instead; None if they stick."""
         found, (forces, N) = {}, self._shared(ways, x, N)
-        if fired.intersection(self.sharing):
+        if fired.intersection(self.sharing):  # where one reaches its bound others do
             fired.update(self.sharing)
         for i, at in self.at.items():
             basis, size = self.bases[i], np.linalg.norm(a[at])

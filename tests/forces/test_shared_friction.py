@@ -129,11 +129,11 @@ def linkage(torques):
     turned = Rotation.from_euler("z", 0.7)
     law = 1.0, (0.1, 0.1, 0.1)
     crank = scene.add_body(*law, position=up / 2, orientation=turned, name="crank")
-    coupler = scene.add_body(*law, position=up + (1, 0, 0), name="coupler")
+    coupler = scene.add_body(*law, position=up + np.eye(3)[0], name="coupler")
     rocker = scene.add_body(*law, position=up / 2 + (2, 0, 0), orientation=turned, name="rocker")
     scene.add(C.Revolute.at(scene.ground, crank, point=(0, 0, 0), axis=(0, 0, 1)))
     scene.add(C.Revolute.at(crank, coupler, point=up, axis=(0, 0, 1)))
-    scene.add(C.Spherical.at(coupler, rocker, point=up + (2, 0, 0)))
+    scene.add(C.Spherical.at(coupler, rocker, point=up + 2 * np.eye(3)[0]))
     scene.add(C.Cylindrical.at(scene.ground, rocker, point=(2, 0, 0), axis=(0, 0, 1)))
     pairs = (scene.ground, crank), (crank, coupler), (coupler, rocker), (scene.ground, rocker)
     for k, (pair, torque) in enumerate(zip(pairs, torques, strict=True)):

@@ -672,7 +672,7 @@ class RestProblem:
                 continue
             along, least = a[at] @ basis @ ways[i], small[at].max()
             across = np.linalg.norm(a[at] @ basis - along * ways[i])
-            if along < -least:
+            if along < -least * (EVENT_ERROR / LEVEL if i in fired else 1.0):  # reactions at an event have its error
                 found[i] = None
             elif across > max(least, np.sqrt(2.0 * NEGLIGIBLE) * size):
                 found[i] = a[at] @ basis / size

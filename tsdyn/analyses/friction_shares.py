@@ -10,9 +10,8 @@ import numpy as np
 
 from ..maths.central_path import proportional
 from ..maths.dense_solve import null_space
-from ..maths.tolerances import RANK_TOL
+from ..maths.tolerances import RANK_TOL, SUM_ROUNDING
 from ..observables.evaluate import ITERATIONS
-from .tolerances import LEVEL
 
 
 class FrictionShares:
@@ -72,7 +71,7 @@ class FrictionShares:
             if not N.size:
                 break
             before, N = N, coupled.changed(reactions, change)
-            if not (np.abs(N - before) > LEVEL * np.abs(N).max()).any():
+            if not (np.abs(N - before) > SUM_ROUNDING * np.abs(N).max()).any():
                 break
         return np.einsum("ijk,ij->ik", self.bases, found / self.sizes), N, change
 

@@ -29,29 +29,29 @@ class SharedFriction:
         normal loads, by the rows of the phase. The shares are followed by the change of the multipliers of bilateral
         rows.
         """
-        frictions, held = self.frictions, self._held(packed, memory)
+        frictions, held = self.frictions, self._held(memory)
         place, directions, forces = frictions.at(q, np.ones(frictions.count), 0.0), [], np.zeros((len(held), 3))
-        for own, (i, rows) in zip(forces, held.items(), strict=True):
-            numbers = memory[np.array([frictions.units[i].held(k) for k in range(len(rows))])]
-            directions.append(place.directions(i, numbers))
-            own[:] = lam[rows] @ directions[-1]
+        holds, none = packed.derived.holds, np.zeros(0, int)
+        rows = [holds.get(frictions.units[i].slot, none)[:rank] for i, rank in held.items()]
+        for own, i, mine in zip(forces, held, rows, strict=True):
+            numbers = memory[np.array([frictions.units[i].held(k) for k in range(len(mine))], int)]
+            directions.append(place.directions(i, numbers) if len(mine) else np.zeros((0, 3)))
+            own[:] = lam[mine] @ directions[-1]
         coupled = reactions = None
         if N.size:
             coupled = normal_loads_of(packed, t, q, qd, memory, gradients(packed, t, q, memory))
             reactions = coupled.reactions(lam[:, None])[..., 0]
         shares = FrictionShares(frictions, self.gaps, list(held), t, q, qd, memory)
         forces, N, change = shares.shared(forces, N, coupled, reactions)
-        return shares, forces, N, change, zip(held.values(), directions, strict=True)
+        return shares, forces, N, change, list(zip(rows, directions, strict=True))
 
-    def _held(self, packed, memory):
-        """Rows of the frictions that are at rest, by their units: the memory has numbers of these."""
-        held = {}
-        for i, unit in enumerate(self.frictions.units):
-            rows = packed.derived.holds.get(unit.slot, ())
-            rank = sum(bool(memory[unit.held(k)].any()) for k in range(len(rows)))
-            if rank:
-                held[i] = rows[:rank]
-        return held
+    def _held(self, memory):
+        """How many rows hold each friction at rest, or could, by units: the memory has numbers of these."""
+        units = self.frictions.units
+        ranks = {
+            i: sum(bool(memory[own.held(k)].any()) for k in range(own.slide.freedom)) for i, own in enumerate(units)
+        }
+        return {i: rank for i, rank in ranks.items() if rank}
 
     def multipliers(self, packed, t, q, qd, memory, lam, N):
         """Multipliers (k, m) in which frictions share their loads, of those by the rows of a phase.
@@ -60,10 +60,12 @@ class SharedFriction:
         """
         out = lam.copy()
         for k, own in enumerate(out):
-            if len(self._held(packed, memory[k])) < 2 or not np.isfinite(N[k]).all():
+            if len(self._held(memory[k])) < 2 or not np.isfinite(N[k]).all():
                 continue
             given = np.nan_to_num(lam[k])
             _, forces, _, change, places = self.at(packed, t[k], q[k], qd[k], memory[k], given, N[k])
+            if not all(len(rows) for rows, _ in places):  # beside redundant rows of joints
+                continue
             own[: change.size] += change
             for (rows, directions), force in zip(places, forces, strict=True):
                 own[rows] = least_squares(directions.T, force, RANK_TOL)

@@ -19,7 +19,7 @@ class FrictionShares:
 
     Parameters
     ----------
-    frictions : friction_problem.Frictions
+    frictions : frictions.Frictions
     gaps : contact_problem.Gaps
         Of the scene.
     which : sequence of int
@@ -28,7 +28,7 @@ class FrictionShares:
 
     Attributes
     ----------
-    units : list of friction_problem.FrictionUnit
+    units : list of frictions.FrictionUnit
     depending : list of int
         Those whose multipliers aren't unique.
     """

@@ -12,7 +12,8 @@ import numpy as np
 from ..ahead import compile_ahead
 from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
-from ..analyses.friction_problem import Frictions, Hold, hold_of, immobile
+from ..analyses.friction_problem import immobile
+from ..analyses.frictions import Frictions, Hold, hold_of
 from ..analyses.tolerances import RESTS, STOPPED
 from ..configuration.initial_conditions import DependentRows
 from ..elements.unilateral import contacts_of

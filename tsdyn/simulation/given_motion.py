@@ -91,7 +91,7 @@ class GivenMotion(Solution):
 def _turn_frictions(scene, kept, followed):
     """Write the directions in which frictions of the exact law slide into what a motion remembers."""
     if any(getattr(force, "slides", ()) for force in scene._forces):
-        from ..analyses.friction_problem import Frictions
+        from ..analyses.frictions import Frictions
 
         frictions, rows, count = Frictions(scene), followed.rows, kept.handles.count
         levels = rows[:, 1 : 1 + 3 * kept.n].reshape(-1, 3, kept.n)

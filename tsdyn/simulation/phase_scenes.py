@@ -62,7 +62,7 @@ def phase_of(scene, rows, holds=(), without=None, every=()):
 
     Kept until the scene changes, or until phases have become so many that their memory is let go of.
 
-    holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
+    holds: rows with numbers that the run remembers, as `frictions.Hold`. without: constraints and forces left
     out, by default those that are inactive at the start. every: all that may hold; the phase is packed with their rows,
     and of those that don't hold the run remembers zeros.
     """

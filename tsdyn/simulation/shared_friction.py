@@ -14,7 +14,7 @@ class SharedFriction:
 
     Parameters
     ----------
-    frictions : friction_problem.Frictions
+    frictions : frictions.Frictions
     gaps : contact_problem.Gaps
         Of the scene.
     """

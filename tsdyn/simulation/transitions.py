@@ -6,7 +6,8 @@ import numpy as np
 
 from ..analyses.contact_friction import Cones, at_turn, halted, solve_rough_contacts
 from ..analyses.contact_problem import Inertia, NoSolution, solve_contacts
-from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, gradients, values_of
+from ..analyses.friction_problem import NoRest, RestProblem, free_motions, gradients, values_of
+from ..analyses.frictions import Hold
 from ..analyses.tolerances import EVENT_ERROR, KEPT_WAY, LEVEL, PIVOTS, RESTS, STOPPED
 from ..elements.bodies import largest_of_kind
 from ..errors import (

@@ -118,8 +118,8 @@ class Breaking(KernelFunctions):
     ----------
     packed : Packed
         Of the phase.
-    sticking : list of friction_problem.FrictionUnit
-    light : list of friction_problem.FrictionUnit
+    sticking : list of frictions.FrictionUnit
+    light : list of frictions.FrictionUnit
     limits : ndarray (sticking and light units,), N
         Loads that count as none.
     shares : shared_friction.SharedFriction, optional

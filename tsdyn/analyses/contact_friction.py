@@ -21,6 +21,7 @@ from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
+from .shared_loads import groups_of, independent, loads_of
 from .tolerances import (
     AHEAD,
     EVENT_ERROR,
@@ -158,6 +159,8 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     for by_rows in False, True:
         found, pulls, moves_so = _solve(inertia, resting, qd, fired, by_rows)
         carries = found.spread and moves_so
+        if found.idle and not carries and (shared := _together(inertia, found, qd, fired)):
+            return shared
         if found.idle and not carries and (alone := _alone(inertia, found, qd, fired)):
             return alone
         if not pulls:
@@ -190,6 +193,64 @@ def _alone(inertia, found, qd, fired):
             return None if pulls else again._replace(idle=sorted([*again.idle, *idle]), grips=grips)
         which = sorted([*again.closed, *again.idle, min(missing, key=again.accelerations.item)])
     return None
+
+
+def _together(inertia, found, qd, fired):
+    """The `ContactState` in which contacts that slide share their loads, see shared_loads.py, or None.
+
+    Without those of them that would have to pull. What starts to slide does so along its acceleration.
+    """
+    gaps, grips, groups, out = inertia.gaps, dict(found.grips), [], set()
+    for members in groups_of(gaps, sorted([*found.closed, *found.idle])):
+        own = independent(gaps, [*(i for i in found.closed if i in members), *members])
+        rest = any(grips[i] is None for i in members)
+        if len(own) < len(members) and {*own} == {*found.closed}.intersection(members) and not rest:
+            groups.append(members)
+    alone, (c, terms) = inertia.slip_accelerations(qd), inertia.accelerations(qd)
+    for _ in range(SECANTS * len(grips) if groups else 0):
+        closed, dependent = [i for i in found.closed if not any(i in members for members in groups)], []
+        for members in groups:
+            carry = [i for i in members if i not in out]
+            own = independent(gaps, [*(i for i in found.closed if i in carry), *carry])
+            closed, dependent = closed + own, dependent + [i for i in carry if i not in own]
+        if not dependent:
+            return None
+        closed, which = sorted(closed), sorted([*closed, *dependent])
+        sticks = [i for i in closed if gaps.rough[i] and grips[i] is None]
+        shares = loads_of(gaps, which, dependent)[:, np.isin(which, closed)]
+        slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
+        loads = np.concatenate([shares.T @ _loads(inertia, which, _ways(inertia, grips)), slips])
+        response = inertia.free(loads.T)
+        A = product(np.concatenate([inertia.J[closed], slips]), response)
+        p = -least_squares(A, np.concatenate([c[closed], alone[sticks].ravel()]), RANK_TOL**2)
+        if (np.linalg.eigvals(A).real < -RANK_TOL * np.abs(A).max()).any():
+            return None
+        N, T, push = shares @ p[: len(closed)], np.hypot(*p[len(closed) :].reshape(-1, 2).T), response @ p
+        small = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)) + inertia.carried()
+        rounding = small[which] / inertia.G[which, which]
+        falls = np.isin(which, fired) & (N - np.maximum(rounding, EVENT_ERROR * N.max()) <= 0.0)
+        least = np.where(falls, -np.inf, N + rounding)
+        moves = alone + inertia.tangents @ push
+        ways = {i: moves[i] / np.hypot(*moves[i]) for i in which if grips.get(i) is not None and i not in found.gains}
+        turned = {i: way for i, way in ways.items() if abs(_cross(inertia.across(i, grips[i]), way)) > EVENT_ERROR}
+        if least.min() < 0.0:
+            out.add(which[least.argmin()])
+        elif turned:
+            grips |= {i: inertia.along(i, way) for i, way in turned.items()}
+        else:
+            break
+    else:
+        return None
+    left, gdd = (1.0 - EVENT_ERROR) * gaps.static[sticks] * N[np.isin(which, sticks)] - T, c + inertia.J @ push
+    others = [i for i in inertia.which if i not in which]
+    if out.difference(*groups) or (left < 0.0).any() or (gdd[others] < -small[others]).any():
+        return None
+    gains, begun = {i: moves[i] for i in found.gains}, {i: float(np.hypot(*moves[i])) for i in ways}
+    idle = sorted({*found.closed, *found.idle}.difference(closed))
+    slack = slack_of(inertia, which, N, small)
+    return ContactState(
+        closed, idle, gdd, push, grips, found.rows, slack, gains, begun, found.slow, dependent=tuple(dependent)
+    )
 
 
 def at_turn(inertia, resting, qd, fired, turned, opening=()):

@@ -103,6 +103,7 @@ class Gaps:
         self.stops = Stops(*of_stops, handles.joints.ravel(), handles.frames)
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
         self._lengths = None, None  # a length, and `lengths` of it
+        self.together = {}  # friction of contacts that share their loads, see grips.py
 
     def extent(self, q):
         """The scene's length at q (n,), m: of points and positions the one farthest off; where there is none, one."""
@@ -395,6 +396,7 @@ class ContactState(NamedTuple):
     begun: dict = MappingProxyType({})  # the size of these, of those that begin to slide, above rounding
     slow: np.ndarray | None = None  # (count,) slips, m/s, below which friction keeps a direction
     spread: dict = MappingProxyType({})  # of closed and idle ones, see contact_friction.py
+    dependent: tuple = ()  # idle ones that carry, too, see shared_loads.py
 
 
 def solve_contacts(inertia, resting, qd, fired=()):

@@ -4,9 +4,12 @@ import numpy as np
 
 from ..analyses.contact_friction import share
 from ..analyses.contact_problem import slip_rows
+from ..analyses.shared_loads import law_of, loads_of, shares_of
 from ..analyses.tolerances import EVENT_ERROR, LEAST_SLIP
 from ..elements.bodies import rotation_matrix
+from ..elements.element import stop_waiting
 from ..elements.friction import heading
+from ..elements.sliding import _SlidingTogether
 from ..jit.kernels import twin
 from ..model.handles import index_of
 from ..observables.reactions import balancing
@@ -22,17 +25,39 @@ from .tolerances import SAME_WAY
 
 def items_of(gaps, modes):
     """The rows that hold closed contacts, and the forces of those that slide."""
-    items = []
+    items, shared = [], {}
+    for members, own, shares in shares_of(gaps, modes.closed, modes.dependent):
+        shared |= {i: _together(gaps, members, own, i, row) for i, row in zip(members, shares, strict=True)}
     for i in modes.closed:
         gap = gaps.list[i]
         if modes.slides(i):
-            items += gap.side.grip[:2]
+            gap_row, alone, *_ = gap.side.grip
+            items += [shared[i]] if i in modes.dependent else [gap_row, shared.get(i, alone)]
         elif modes.sticks(i):
             first, *others = gap.parts
             items += [first, *(part for part, held in zip(others, modes.grips[i], strict=False) if held)]
         else:
             items.append(gap.side.row)
     return items
+
+
+def _together(gaps, members, own, i, shares):
+    """The friction of a contact that carries shares (r,) of the reactions of others; the same for the same ones."""
+    key = i, *members, *own
+    if key not in gaps.together:
+        reads = tuple(gaps.list[j].side.grip.gap for j in own)
+        gaps.together[key] = _SlidingTogether(gaps.list[i].side.grip.sliding, reads, *law_of(gaps, i, own, shares))
+        stop_waiting(gaps.together[key])
+    return gaps.together[key]
+
+
+def normal_loads(gaps, modes, first, lam):
+    """Loads (k, closed), those that push positive, by the multipliers lam (k, rows) of a phase."""
+    own = [i not in modes.dependent for i in modes.closed]
+    rows = [first[id(gap_row(gaps, modes, i))] for i in modes.closed if i not in modes.dependent]
+    found = np.zeros((len(lam), len(own)))
+    found[:, own] = -gaps.sign[modes.closed][own] * lam[:, rows]
+    return found @ loads_of(gaps, modes.closed, modes.dependent).T if modes.dependent else found
 
 
 def held_point(packed, part, q):
@@ -128,11 +153,12 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
     if not frictional:
         return
     first = first_row_of(packed)
-    N = np.array([-gaps.sign[i] * lam[:, first[id(gap_row(gaps, modes, i))]] for i in frictional]).T
+    loads = normal_loads(gaps, modes, first, lam)
+    N = loads[:, gaps.rough[modes.closed]]
     tangents = np.array([gaps.slopes(*pair, frictional) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
     rows = gaps.slip_rows[frictional]
     smooth = [i for i in modes.closed if not gaps.rough[i]]
-    M = -gaps.sign[smooth] * lam[:, [first[id(gap_row(gaps, modes, i))] for i in smooth]]
+    M = loads[:, ~gaps.rough[modes.closed]]
     sticks = [j for j, i in enumerate(frictional) if modes.sticks(i)]
     if sticks:
         T = -out[:, rows[sticks]]

@@ -244,8 +244,9 @@ class Transitions:
     def _take_contacts(self, contacts, before):
         """Take over a `ContactState`."""
         self.remembered, modes = self.remembered.copy(), self.modes
-        modes.closed, modes.idle, modes.slack = contacts.closed, contacts.idle, dict(contacts.slack)
-        modes.spread = dict(contacts.spread)
+        modes.closed, modes.slack = sorted([*contacts.closed, *contacts.dependent]), dict(contacts.slack)
+        modes.idle = [i for i in contacts.idle if i not in contacts.dependent]
+        modes.spread, modes.dependent = dict(contacts.spread), list(contacts.dependent)
         modes.rising = {i: (self.t, gain) for i, gain in contacts.begun.items()}
         modes.grips = gripped(self.gaps, before, contacts, self.q, self.remembered[self.count :])
 

@@ -1,0 +1,74 @@
+"""Loads of contacts between the same two bodies whose rows depend on each other, as those of a box with four feet.
+
+    J_i = sum C_ij J_j,   C: x_i - x_j in the plane, of three points at most whose rows are independent      (1)
+    N   = S lam,          S = C (C^T C)^-1                                                                   (2)
+
+Of all loads N of the same resultant as lam of the independent rows these are the least; so are those of points that are
+equally compliant. C and S are of the body that has the points: constant as long as the same contacts carry.
+"""
+
+import numpy as np
+
+from ..elements.sliding import _Sliding
+from ..maths.dense_solve import least_squares
+from ..maths.tolerances import RANK_TOL
+
+
+def groups_of(gaps, which):
+    """Lists of those of the gaps `which` that may share loads: points of one body on one plane, with friction."""
+    groups = {}
+    for i in which:
+        if not gaps.rough[i]:
+            continue
+        law = gaps.list[i].side.grip.sliding
+        if type(law) is _Sliding and not law.balls and law.a.dimension == 7:
+            groups.setdefault((id(law.a), id(law.b), *law.normal_b), []).append(i)
+    return list(groups.values())
+
+
+def independent(gaps, which):
+    """Those of the points of a group, one after the other, that no line and no plane through those before holds."""
+    points, kept, basis = _points(gaps, which), [], []
+    for i, own in zip(which, points, strict=True):
+        for _ in range(2):
+            own = own - sum((own @ one * one for one in basis), np.zeros(4))
+        if (size := np.linalg.norm(own)) > RANK_TOL:
+            kept.append(i)
+            basis.append(own / size)
+    return kept
+
+
+def _points(gaps, which):
+    """1 and point_a over the size of the group (k, 4)."""
+    places = np.array([gaps.list[i].side.grip.sliding.point_a for i in which])
+    size = np.abs(places - places[0]).max(initial=0.0)
+    return np.column_stack([np.ones(len(which)), (places - places.mean(axis=0)) / (size if size > 0.0 else 1.0)])
+
+
+def shares_of(gaps, closed, dependent):
+    """Yield each group of which some are `dependent`: its gaps (c), those with rows (r), and S (c, r), Eq. (2)."""
+    for members in groups_of(gaps, closed) if len(dependent) else ():
+        own = [i for i in members if i not in dependent]
+        if len(own) < len(members):
+            points = _points(gaps, members)
+            C = least_squares(points[[members.index(i) for i in own]].T, points.T, RANK_TOL).T
+            yield members, own, least_squares(C.T, np.eye(len(own)), RANK_TOL)
+
+
+def loads_of(gaps, closed, dependent):
+    """Loads of closed gaps by the reactions of their rows, (c, c): those themselves, or Eq. (2)."""
+    S = np.eye(len(closed))
+    for members, own, shares in shares_of(gaps, closed, dependent):
+        at = [closed.index(i) for i in members]
+        S[at] = 0.0
+        S[np.ix_(at, [closed.index(i) for i in own])] = shares
+    return S
+
+
+def law_of(gaps, i, own, shares):
+    """c and h (3,) of sliding.py, Eq. (5), of a contact whose load are such shares (r,) of rows `own`."""
+    places = np.array([gaps.list[j].side.grip.sliding.point_a for j in (i, *own)])
+    arms = places[1:] - places[0]
+    size = np.abs(arms).max(initial=0.0)
+    c, *h = least_squares(np.column_stack([np.ones(len(own)), arms / size]), shares, RANK_TOL)
+    return c, np.array(h) / size

@@ -21,7 +21,7 @@ from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
-from .shared_loads import groups_of, independent, loads_of
+from .shared_loads import groups_of, loads_of, rank_of, rows_of_closed
 from .tolerances import (
     AHEAD,
     EVENT_ERROR,
@@ -159,7 +159,7 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     for by_rows in False, True:
         found, pulls, moves_so = _solve(inertia, resting, qd, fired, by_rows)
         carries = found.spread and moves_so
-        if found.idle and not carries and (shared := _together(inertia, found, qd, fired)):
+        if found.idle and not carries and (shared := _together(inertia, resting, found, qd, fired)):
             return shared
         if found.idle and not carries and (alone := _alone(inertia, found, qd, fired)):
             return alone
@@ -195,24 +195,28 @@ def _alone(inertia, found, qd, fired):
     return None
 
 
-def _together(inertia, found, qd, fired):
+def _together(inertia, resting, found, qd, fired):
     """The `ContactState` in which contacts that slide share their loads, see shared_loads.py, or None.
 
     Without those of them that would have to pull. What starts to slide does so along its acceleration.
     """
-    gaps, grips, groups, out = inertia.gaps, dict(found.grips), [], set()
+    gaps, out = inertia.gaps, set()
     for members in groups_of(gaps, sorted([*found.closed, *found.idle])):
-        own = independent(gaps, [*(i for i in found.closed if i in members), *members])
-        rest = any(grips[i] is None for i in members)
-        if len(own) < len(members) and {*own} == {*found.closed}.intersection(members) and not rest:
-            groups.append(members)
+        sliding = [found.grips[i] is not None for i in members]
+        if any(sliding) and not all(sliding):
+            with suppress(NoSolution):
+                found = _solve(inertia, resting, qd, fired, least=True)[0]
+    grips, groups = dict(found.grips), groups_of(gaps, sorted([*found.closed, *found.idle]))
+    groups = [members for members in groups if all(grips[i] is not None for i in members)]
     alone, (c, terms) = inertia.slip_accelerations(qd), inertia.accelerations(qd)
     for _ in range(SECANTS * len(grips) if groups else 0):
         closed, dependent = [i for i in found.closed if not any(i in members for members in groups)], []
         for members in groups:
-            carry = [i for i in members if i not in out]
-            own = independent(gaps, [*(i for i in found.closed if i in carry), *carry])
-            closed, dependent = closed + own, dependent + [i for i in carry if i not in own]
+            carry, first = [i for i in members if i not in out], len(closed)
+            for i in sorted(carry, key=lambda i: i not in found.closed):
+                (dependent if depends(inertia, closed, i) else closed).append(i)
+            if len(closed) - first not in (1, rank_of(gaps, carry)):
+                return None
         if not dependent:
             return None
         closed, which = sorted(closed), sorted([*closed, *dependent])
@@ -221,8 +225,9 @@ def _together(inertia, found, qd, fired):
         slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
         loads = np.concatenate([shares.T @ _loads(inertia, which, _ways(inertia, grips)), slips])
         response = inertia.free(loads.T)
-        A = product(np.concatenate([inertia.J[closed], slips]), response)
-        p = -least_squares(A, np.concatenate([c[closed], alone[sticks].ravel()]), RANK_TOL**2)
+        rows, a = (rows_of_closed(gaps, which, dependent, x) for x in (inertia.J, c))
+        A = product(np.concatenate([rows, slips]), response)
+        p = -least_squares(A, np.concatenate([a, alone[sticks].ravel()]), RANK_TOL**2)
         if (np.linalg.eigvals(A).real < -RANK_TOL * np.abs(A).max()).any():
             return None
         N, T, push = shares @ p[: len(closed)], np.hypot(*p[len(closed) :].reshape(-1, 2).T), response @ p
@@ -354,20 +359,21 @@ def _pair(gaps, i):
     return frozenset((id(part.a), id(part.b)))
 
 
-def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})):
+def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({}), least=False):
     """As `solve_rough_contacts`, with the normal loads shared among all contacts; whether a closed one pulls.
 
     And whether the bodies move so where idle contacts carry nothing, as in the phase.
 
     by_rows: closed contacts are chosen by what holds their rows, instead of by the same accelerations.
     ways: of `Cones`.
+    least: normal loads are the least of their resultant.
     """
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd, ways)
     response = inertia.free(cones.rows.T)
     G, c, terms = product(cones.rows, response), cones.open, cones.terms
     b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
-    p, mode, mu = cones.solve(G, b)
+    p, mode, mu = cones.solve(G + _stiffness(inertia, resting, G) if least else G, b)
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
     _demand_unique(G, d, mu, mode)
     push = response @ p
@@ -439,6 +445,14 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
             slack = slack_of(inertia, closed, shares, small)
             return state._replace(closed=closed, idle=idle, rows=rows, slack=slack, spread=spread), False, True
     return found
+
+
+def _stiffness(inertia, resting, G):
+    """What, added to G, takes loads without a resultant from normal reactions: z z^T of these loads z."""
+    loads, more = inertia.free(inertia.J[resting].T).T * inertia.gaps.levers(inertia.q), np.zeros_like(G)
+    z = null_space(loads.T, RANK_TOL)
+    more[::3, ::3] = np.diag(G)[::3].mean() * z @ z.T
+    return more
 
 
 def _sharing(G, b, p, mode, cones, response):

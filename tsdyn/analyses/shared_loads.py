@@ -5,12 +5,15 @@
 
 Of all loads N of the same resultant as lam of the independent rows these are the least; so are those of points that are
 equally compliant. C and S are of the body that has the points: constant as long as the same contacts carry.
+
+Where others hold the rotations about the plane, as one finger of a gripper for both, one row is left, that of the mean
+point, and loads are alike.
 """
 
 import numpy as np
 
 from ..elements.sliding import _Sliding
-from ..maths.dense_solve import least_squares
+from ..maths.dense_solve import least_squares, null_space
 from ..maths.tolerances import RANK_TOL
 
 
@@ -21,21 +24,15 @@ def groups_of(gaps, which):
         if not gaps.rough[i]:
             continue
         law = gaps.list[i].side.grip.sliding
-        if type(law) is _Sliding and not law.balls and law.a.dimension == 7:
+        if type(law) is _Sliding and not (law.balls or law.tyre_radius) and law.a.dimension == 7:
             groups.setdefault((id(law.a), id(law.b), *law.normal_b), []).append(i)
     return list(groups.values())
 
 
-def independent(gaps, which):
-    """Those of the points of a group, one after the other, that no line and no plane through those before holds."""
-    points, kept, basis = _points(gaps, which), [], []
-    for i, own in zip(which, points, strict=True):
-        for _ in range(2):
-            own = own - sum((own @ one * one for one in basis), np.zeros(4))
-        if (size := np.linalg.norm(own)) > RANK_TOL:
-            kept.append(i)
-            basis.append(own / size)
-    return kept
+def rank_of(gaps, which):
+    """The number of points of a group, three at most, whose rows are independent where nothing else holds the body."""
+    points = _points(gaps, which)
+    return points.shape[1] - null_space(points, RANK_TOL).shape[1]
 
 
 def _points(gaps, which):
@@ -49,7 +46,9 @@ def shares_of(gaps, closed, dependent):
     """Yield each group of which some are `dependent`: its gaps (c), those with rows (r), and S (c, r), Eq. (2)."""
     for members in groups_of(gaps, closed) if len(dependent) else ():
         own = [i for i in members if i not in dependent]
-        if len(own) < len(members):
+        if len(own) == 1 < len(members):
+            yield members, own, np.full((len(members), 1), 1.0 / len(members))
+        elif len(own) < len(members):
             points = _points(gaps, members)
             C = least_squares(points[[members.index(i) for i in own]].T, points.T, RANK_TOL).T
             yield members, own, least_squares(C.T, np.eye(len(own)), RANK_TOL)
@@ -65,8 +64,19 @@ def loads_of(gaps, closed, dependent):
     return S
 
 
+def rows_of_closed(gaps, closed, dependent, values):
+    """Of `values` (count, ...) of gaps those of the rows that hold closed ones: a mean where one row is of several."""
+    found = values[[i for i in closed if i not in dependent]]
+    for members, own, _ in shares_of(gaps, closed, dependent):
+        if len(own) == 1:
+            found[[i for i in closed if i not in dependent].index(own[0])] = values[members].mean(axis=0)
+    return found
+
+
 def law_of(gaps, i, own, shares):
     """c and h (3,) of sliding.py, Eq. (5), of a contact whose load are such shares (r,) of rows `own`."""
+    if len(own) == 1:
+        return shares[0], np.zeros(3)
     places = np.array([gaps.list[j].side.grip.sliding.point_a for j in (i, *own)])
     arms = places[1:] - places[0]
     size = np.abs(arms).max(initial=0.0)

@@ -31,8 +31,8 @@ def items_of(gaps, modes):
     for i in modes.closed:
         gap = gaps.list[i]
         if modes.slides(i):
-            gap_row, alone, *_ = gap.side.grip
-            items += [shared[i]] if i in modes.dependent else [gap_row, shared.get(i, alone)]
+            items += [] if i in modes.dependent else [gap_row(gaps, modes, i)]
+            items.append(shared.get(i, gap.side.grip.sliding))
         elif modes.sticks(i):
             first, *others = gap.parts
             items += [first, *(part for part, held in zip(others, modes.grips[i], strict=False) if held)]
@@ -45,8 +45,19 @@ def _together(gaps, members, own, i, shares):
     """The friction of a contact that carries shares (r,) of the reactions of others; the same for the same ones."""
     key = i, *members, *own
     if key not in gaps.together:
-        reads = tuple(gaps.list[j].side.grip.gap for j in own)
+        reads = [gaps.list[j].side.grip.gap for j in own] if len(own) > 1 else [_mean_row(gaps, members)]
         gaps.together[key] = _SlidingTogether(gaps.list[i].side.grip.sliding, reads, *law_of(gaps, i, own, shares))
+        stop_waiting(gaps.together[key])
+    return gaps.together[key]
+
+
+def _mean_row(gaps, members):
+    """The row of the mean of points on a plane; the same for the same ones."""
+    key = tuple(members)
+    if key not in gaps.together:
+        row, points = gaps.list[members[0]].side.grip.gap, [gaps.list[i].side.grip.gap.point_a for i in members]
+        places = {"point_a": np.mean(points, axis=0), "point_b": row.point_b, "normal_b": row.normal_b}
+        gaps.together[key] = type(row)(row.a, row.b, **places)
         stop_waiting(gaps.together[key])
     return gaps.together[key]
 
@@ -104,6 +115,9 @@ def stopping_time(inertia, which, qd, after, qdd, slow):
 def gap_row(gaps, modes, i):
     """The primitive whose first row is the gap of a closed contact in a phase."""
     gap = gaps.list[i]
+    for members, own, _ in shares_of(gaps, modes.closed, modes.dependent):
+        if own == [i]:
+            return _mean_row(gaps, members)
     return gap.side.grip.gap if modes.slides(i) else gap.side.row
 
 

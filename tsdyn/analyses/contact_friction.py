@@ -210,16 +210,10 @@ def _together(inertia, resting, found, qd, fired):
     groups = [members for members in groups if all(grips[i] is not None for i in members)]
     alone, (c, terms) = inertia.slip_accelerations(qd), inertia.accelerations(qd)
     for _ in range(SECANTS * len(grips) if groups else 0):
-        closed, dependent = [i for i in found.closed if not any(i in members for members in groups)], []
-        for members in groups:
-            carry, first = [i for i in members if i not in out], len(closed)
-            for i in sorted(carry, key=lambda i: i not in found.closed):
-                (dependent if depends(inertia, closed, i) else closed).append(i)
-            if len(closed) - first not in (1, rank_of(gaps, carry)):
-                return None
+        closed, dependent = _ranked(inertia, found, groups, out)
         if not dependent:
             return None
-        closed, which = sorted(closed), sorted([*closed, *dependent])
+        which = sorted([*closed, *dependent])
         sticks = [i for i in closed if gaps.rough[i] and grips[i] is None]
         shares = loads_of(gaps, which, dependent)[:, np.isin(which, closed)]
         slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
@@ -235,8 +229,10 @@ def _together(inertia, resting, found, qd, fired):
         rounding = small[which] / inertia.G[which, which]
         falls = np.isin(which, fired) & (N - np.maximum(rounding, EVENT_ERROR * N.max()) <= 0.0)
         least = np.where(falls, -np.inf, N + rounding)
-        moves = alone + inertia.tangents @ push
-        ways = {i: moves[i] / np.hypot(*moves[i]) for i in which if grips.get(i) is not None and i not in found.gains}
+        moves, pace = alone + inertia.tangents @ push, np.abs(alone) + np.abs(inertia.tangents @ response) @ np.abs(p)
+        gain, least_gain = np.hypot(*moves.T), EVENT_ERROR * pace.max(axis=1)
+        begins = [i for i in which if grips.get(i) is not None and i not in found.gains and gain[i] > least_gain[i]]
+        ways = {i: moves[i] / gain[i] for i in begins}
         turned = {i: way for i, way in ways.items() if abs(_cross(inertia.across(i, grips[i]), way)) > EVENT_ERROR}
         if least.min() < 0.0:
             out.add(which[least.argmin()])
@@ -250,12 +246,39 @@ def _together(inertia, resting, found, qd, fired):
     others = [i for i in inertia.which if i not in which]
     if out.difference(*groups) or (left < 0.0).any() or (gdd[others] < -small[others]).any():
         return None
-    gains, begun = {i: moves[i] for i in found.gains}, {i: float(np.hypot(*moves[i])) for i in ways}
+    gains, begun = {i: moves[i] for i in found.gains}, {i: float(gain[i]) for i in ways}
     idle = sorted({*found.closed, *found.idle}.difference(closed))
     slack = slack_of(inertia, which, N, small)
     return ContactState(
         closed, idle, gdd, push, grips, found.rows, slack, gains, begun, found.slow, dependent=tuple(dependent)
     )
+
+
+def _ranked(inertia, found, groups, out):
+    """Closed gaps whose rows are independent, and those that share loads with them: of groups, but those that are out.
+
+    Groups go whose rows may depend on others at this instant alone.
+    """
+    gaps, closed, dependent, held = inertia.gaps, [], [], []
+    closed += [i for i in found.closed if not any(i in members for members in groups)]
+    for members in list(groups):
+        own, first = [i for i in members if i not in out], len(closed)
+        if not own:
+            continue
+        rest, law, n = [], gaps.list[own[0]].side.grip.sliding, inertia.normal(own[0])
+        for i in sorted(own, key=lambda i: i not in found.closed):
+            (rest if depends(inertia, closed, i) else closed).append(i)
+        rank = len(closed) - first
+        along = (a is law.a and np.abs(np.cross(z, n)).max() < HALF_DIGITS for a, z in held)
+        if rank == rank_of(gaps, own):
+            dependent += rest
+            held += [(law.a, n)] if rank == 3 and not gaps.turns(law.b) else []
+        elif rank == 1 and not gaps.turns(law.b) and (any(along) or not gaps.turns(law.a)):
+            dependent += rest
+        else:
+            groups.remove(members)
+            return _ranked(inertia, found, groups, out)
+    return sorted(closed), dependent
 
 
 def at_turn(inertia, resting, qd, fired, turned, opening=()):

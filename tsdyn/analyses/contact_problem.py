@@ -18,6 +18,7 @@ import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
 from ..elements.bodies import turning
+from ..formulations.locked_orientations import still
 from ..maths.complementarity import complement
 from ..maths.dense_solve import least_squares, product
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
@@ -128,6 +129,12 @@ class Gaps:
     def __reduce__(self):
         """Made again in another process: the memory of kernels belongs to this one."""
         return Gaps, self._made_of
+
+    def turns(self, body):
+        """Whether a body may rotate, with all contacts open."""
+        packed = self._made_of[2]
+        locked = [packed.bodies[i] for i in still(packed).bodies]
+        return body.dimension == 7 and not any(body is each for each in locked)
 
     @property
     def workspace(self):
@@ -327,6 +334,11 @@ class Inertia:
         """Accelerations (n,) where all gaps are open, and gamma of the rows of all contacts."""
         qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
         return qdd + self._more, gamma
+
+    def normal(self, i):
+        """The normal (3,) of a contact with friction, ground frame."""
+        _, at, sign = self.gaps.slips([i])
+        return sign * self.J[i, at[0] : at[0] + 3]
 
     def across(self, i, d):
         """Components (2,) of a direction d (3,), ground frame, along the slips of a gap."""

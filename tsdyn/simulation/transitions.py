@@ -424,7 +424,9 @@ class Transitions:
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
         unit = self.frictions.units[i]
         hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
-        phase = self._scene_of([self.gaps.list[k].side.gap for k in self.modes.closed], [hold])
+        phase = self._scene_of(
+            [self.gaps.list[k].side.gap for k in self.modes.closed if k not in self.modes.dependent], [hold]
+        )
         memory = self.remembered[self.count :].copy()
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]

@@ -201,12 +201,11 @@ def _together(inertia, resting, found, qd, fired):
     Without those of them that would have to pull. What starts to slide does so along its acceleration.
     """
     gaps, out = inertia.gaps, set()
-    for members in groups_of(gaps, sorted([*found.closed, *found.idle])):
-        sliding = [found.grips[i] is not None for i in members]
-        if any(sliding) and not all(sliding):
-            with suppress(NoSolution):
-                found = _solve(inertia, resting, qd, fired, least=True)[0]
-    grips, groups = dict(found.grips), groups_of(gaps, sorted([*found.closed, *found.idle]))
+    sliding = [[found.grips[i] is not None for i in members] for members in groups_of(gaps, found.held)]
+    if any(any(each) and not all(each) for each in sliding):
+        with suppress(NoSolution):
+            found = _solve(inertia, resting, qd, fired, least=True)[0]
+    grips, groups = dict(found.grips), groups_of(gaps, found.held)
     groups = [members for members in groups if all(grips[i] is not None for i in members)]
     alone, (c, terms) = inertia.slip_accelerations(qd), inertia.accelerations(qd)
     for _ in range(SECANTS * len(grips) if groups else 0):
@@ -247,7 +246,7 @@ def _together(inertia, resting, found, qd, fired):
     if out.difference(*groups) or (left < 0.0).any() or (gdd[others] < -small[others]).any():
         return None
     gains, begun = {i: moves[i] for i in found.gains}, {i: float(gain[i]) for i in ways}
-    idle = sorted({*found.closed, *found.idle}.difference(closed))
+    idle = [i for i in found.held if i not in closed]
     slack = slack_of(inertia, which, N, small)
     return ContactState(
         closed, idle, gdd, push, grips, found.rows, slack, gains, begun, found.slow, dependent=tuple(dependent)

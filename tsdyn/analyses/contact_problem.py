@@ -410,6 +410,11 @@ class ContactState(NamedTuple):
     spread: dict = MappingProxyType({})  # of closed and idle ones, see contact_friction.py
     dependent: tuple = ()  # idle ones that carry, too, see shared_loads.py
 
+    @property
+    def held(self):
+        """Closed and idle ones, a sorted list."""
+        return sorted([*self.closed, *self.idle])
+
 
 def solve_contacts(inertia, resting, qd, fired=()):
     """Which of the gaps that are closed and at rest stay so, by the complementarity problem of accelerations.

@@ -193,7 +193,7 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
                 f = np.einsum("kc,kcn->kn", more, normals) + np.einsum("kci,kcin->kn", T - alone, tangents[:, sticks])
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
-            pushing = [first[id(gap_row(gaps, modes, i))] for i in (*frictional, *smooth)]
+            pushing = [first[id(gap_row(gaps, modes, i))] for i in modes.closed if i not in modes.dependent]
             moves = np.abs(change[:, pushing]).max(axis=1) > EVENT_ERROR * np.abs(N).max(axis=1)
             change[moves], T[moves], others[moves] = 0.0, alone[moves], M[moves]
             for j, i in enumerate(sticks):

@@ -139,6 +139,18 @@ def test_a_gripper_that_weakens_lets_a_box_slip_when_all_points_are_at_their_bou
     assert abs(solution.phases[0][1] - (2.0 - G / 10.0)) < 1e-12
 
 
+def test_a_gripper_that_weakens_drops_a_box_without_a_turn():
+    """All eight points carry alike, m z'' = 8 mu N - m g with N = F / 4, F = 20 - 10 t."""
+    begin, end = 2.0 - G / 10.0, 1.1
+    solution = ts.simulate(gripper(10.0), (0, end), rtol=1e-12, atol=1e-12)
+    fall = (16.0 - G) * (end - begin) ** 2 / 2 - 4.0 * (end**3 / 3 - begin**2 * end + 2.0 * begin**3 / 3)
+    np.testing.assert_allclose(solution.position("box")[-1], [0, 0, fall], atol=1e-12)
+    assert np.abs(solution.angular_velocity("box")).max() < 1e-11
+    for k, (side, name) in itertools.product(range(4), ((-1, "left"), (1, "right"))):
+        load = (20.0 - 10.0 * end) / 4
+        np.testing.assert_allclose(solution.reaction(f"{name}{k}")[0][-1], [-side * load, 0, 0.4 * load], atol=1e-9)
+
+
 def two_slip_at_once(force):
     """What is left at 1/2 of the bounds of two points, 4.905 N each, that share the friction along their line."""
     across = np.array([0.9, 0.1]) * 0.435 * force

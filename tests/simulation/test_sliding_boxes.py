@@ -6,7 +6,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import tsdyn as ts
+from tests.helpers.resuming import Stop
 from tests.helpers.rough_boxes import FLOOR, G, boxes
+from tsdyn.runs import driver
 
 C = ts.constraints
 BOXES = [
@@ -74,6 +76,47 @@ def test_a_box_that_slides_and_turns_comes_to_rest_in_few_phases():
     R = state.rotation("0")
     found = *state.position("0")[:2], np.arctan2(R[1, 0], R[0, 0])
     np.testing.assert_allclose(found, slid([0.3] * 4, size, range(4), (1, 0), 3.0, 0.3), atol=1e-10)
+
+
+@pytest.mark.parametrize("size", [(0.4, 0.4, 0.2), (0.5, 0.3, 0.3)])
+def test_a_box_that_slides_and_turns_is_carried_by_all_corners(size):
+    """The floor takes work by the friction of all four."""
+    scene = boxes(1, mu=0.3, size=size, velocity=(1, 0.3, 0), spin=5.0)
+    solution = ts.simulate(scene, (0, 0.5), rtol=1e-11, atol=1e-11, dense_output=True)
+    state = solution.at(0.3)
+    R = state.rotation("0")
+    found = *state.position("0")[:2], np.arctan2(R[1, 0], R[0, 0])
+    np.testing.assert_allclose(found, slid([0.3] * 4, size, range(4), (1, 0.3), 5.0, 0.3), atol=1e-10)
+    loads = np.array([state.reaction(contact)[0][2] for contact in scene.constraints[:4]])
+    np.testing.assert_allclose([loads.sum(), loads @ (1, -1, -1, 1)], [G, 0.0], atol=1e-10)
+    np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=1e-12)
+    assert not solution.qd[-1].any()
+
+
+def test_a_square_box_that_spins_stays_where_it_is():
+    """It slows down by mu m g r, r the half diagonal; each corner carries a quarter."""
+    scene, J, r = boxes(1, mu=0.3, size=(0.4, 0.4, 0.2), spin=5.0), 0.4**2 / 6, 0.08**0.5
+    solution = ts.simulate(scene, (0, 0.5))
+    np.testing.assert_allclose(solution.phases[0][1], J * 5.0 / (0.3 * G * r), rtol=1e-12)
+    assert np.abs(solution.position("0") - [0, 0, 0.1]).max() < 1e-15
+    for contact in scene.constraints[:4]:
+        slides = ~solution.sticking(contact)
+        np.testing.assert_allclose(solution.reaction(contact)[0][slides, 2], G / 4, rtol=1e-12)
+
+
+def test_a_box_that_slides_and_turns_goes_on_from_a_checkpoint_to_the_same_bits(tmp_path, monkeypatch):
+    def box():
+        return boxes(1, mu=0.4, size=(0.4, 0.4, 0.5), velocity=(2, 1, 0), spin=5.0)
+
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
+    whole = ts.simulate(box(), (0, 1))
+    for stop in (2, 4):
+        path = tmp_path / f"run {stop}.h5"
+        stopped = ts.simulate(box(), (0, 1), store=path, checkpoint=0.0, progress=Stop(stop))
+        assert stopped.status is ts.Status.INTERRUPTED
+        resumed = ts.resume(path)
+        np.testing.assert_array_equal(resumed.q, whole.q)
+        assert resumed.phases == whole.phases
 
 
 def test_slips_that_turn_while_they_end_make_few_events():

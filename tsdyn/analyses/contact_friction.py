@@ -159,7 +159,7 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     for by_rows in False, True:
         found, pulls, moves_so = _solve(inertia, resting, qd, fired, by_rows)
         carries = found.spread and moves_so
-        if found.idle and not carries and (shared := _together(inertia, resting, found, qd, fired)):
+        if (found.idle or len(fired)) and not carries and (shared := _together(inertia, resting, found, qd, fired)):
             return shared
         if found.idle and not carries and (alone := _alone(inertia, found, qd, fired)):
             return alone
@@ -200,41 +200,45 @@ def _together(inertia, resting, found, qd, fired):
 
     Without those of them that would have to pull. What starts to slide does so along its acceleration.
     """
-    gaps, out = inertia.gaps, set()
-    sliding = [[found.grips[i] is not None for i in members] for members in groups_of(gaps, found.held)]
-    if any(any(each) and not all(each) for each in sliding):
-        with suppress(NoSolution):
-            found = _solve(inertia, resting, qd, fired, least=True)[0]
-    grips, groups = dict(found.grips), groups_of(gaps, found.held)
-    groups = [members for members in groups if all(grips[i] is not None for i in members)]
+    gaps, grips, slips, out = inertia.gaps, dict(found.grips), inertia.slips(qd), set()
     alone, (c, terms) = inertia.slip_accelerations(qd), inertia.accelerations(qd)
+    # What no longer pushes stays closed, if others hold it
+    still = [i for i in resting if i in fired and found.accelerations[i] <= LEVEL * terms[i] + inertia.carried()[i]]
+    light = [i for i in still if i not in found.held and slips[i].any() and depends(inertia, found.closed, i)]
+    grips |= {i: inertia.along(i, slips[i] / np.hypot(*slips[i])) for i in light}
+    held = sorted([*found.held, *light])
+    groups = [members for members in groups_of(gaps, held) if all(grips[i] is not None for i in members)]
     for _ in range(SECANTS * len(grips) if groups else 0):
         closed, dependent = _ranked(inertia, found, groups, out)
-        if not dependent:
+        if not (dependent or out):
             return None
         which = sorted([*closed, *dependent])
         sticks = [i for i in closed if gaps.rough[i] and grips[i] is None]
         shares = loads_of(gaps, which, dependent)[:, np.isin(which, closed)]
-        slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
-        loads = np.concatenate([shares.T @ _loads(inertia, which, _ways(inertia, grips)), slips])
+        tangents = inertia.tangents[sticks].reshape(-1, inertia.q.size)
+        loads = np.concatenate([product(shares.T, _loads(inertia, which, _ways(inertia, grips))), tangents])
         response = inertia.free(loads.T)
         rows, a = (rows_of_closed(gaps, which, dependent, x) for x in (inertia.J, c))
-        A = product(np.concatenate([rows, slips]), response)
+        A = product(np.concatenate([rows, tangents]), response)
         p = -least_squares(A, np.concatenate([a, alone[sticks].ravel()]), RANK_TOL**2)
         if (np.linalg.eigvals(A).real < -RANK_TOL * np.abs(A).max()).any():
             return None
         N, T, push = shares @ p[: len(closed)], np.hypot(*p[len(closed) :].reshape(-1, 2).T), response @ p
         small = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)) + inertia.carried()
-        rounding = small[which] / inertia.G[which, which]
-        falls = np.isin(which, fired) & (N - np.maximum(rounding, EVENT_ERROR * N.max()) <= 0.0)
-        least = np.where(falls, -np.inf, N + rounding)
+        rounding = np.maximum(small[which] / inertia.G[which, which], EVENT_ERROR * N.max())
+        least = np.where(np.isin(which, fired) & (N - rounding <= 0.0), -np.inf, N + rounding)
         moves, pace = alone + inertia.tangents @ push, np.abs(alone) + np.abs(inertia.tangents @ response) @ np.abs(p)
         gain, least_gain = np.hypot(*moves.T), EVENT_ERROR * pace.max(axis=1)
-        begins = [i for i in which if grips.get(i) is not None and i not in found.gains and gain[i] > least_gain[i]]
+        begins = [i for i in which if grips.get(i) is not None and not slips[i].any()]
+        if (gain[begins] <= least_gain[begins]).any():
+            return None
         ways = {i: moves[i] / gain[i] for i in begins}
         turned = {i: way for i, way in ways.items() if abs(_cross(inertia.across(i, grips[i]), way)) > EVENT_ERROR}
+        worst = which[least.argmin()]
         if least.min() < 0.0:
-            out.add(which[least.argmin()])
+            if not any(worst in members for members in groups):
+                return None
+            out.add(worst)
         elif turned:
             grips |= {i: inertia.along(i, way) for i, way in turned.items()}
         else:
@@ -243,10 +247,10 @@ def _together(inertia, resting, found, qd, fired):
         return None
     left, gdd = (1.0 - EVENT_ERROR) * gaps.static[sticks] * N[np.isin(which, sticks)] - T, c + inertia.J @ push
     others = [i for i in inertia.which if i not in which]
-    if out.difference(*groups) or (left < 0.0).any() or (gdd[others] < -small[others]).any():
+    if (left < 0.0).any() or (gdd[others] < -small[others]).any():
         return None
-    gains, begun = {i: moves[i] for i in found.gains}, {i: float(gain[i]) for i in ways}
-    idle = [i for i in found.held if i not in closed]
+    gains, begun = {i: moves[i] for i in held if slips[i].any()}, {i: float(gain[i]) for i in ways}
+    idle = [i for i in held if i not in closed]
     slack = slack_of(inertia, which, N, small)
     return ContactState(
         closed, idle, gdd, push, grips, found.rows, slack, gains, begun, found.slow, dependent=tuple(dependent)
@@ -381,21 +385,20 @@ def _pair(gaps, i):
     return frozenset((id(part.a), id(part.b)))
 
 
-def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({}), least=False):
+def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})):
     """As `solve_rough_contacts`, with the normal loads shared among all contacts; whether a closed one pulls.
 
     And whether the bodies move so where idle contacts carry nothing, as in the phase.
 
     by_rows: closed contacts are chosen by what holds their rows, instead of by the same accelerations.
     ways: of `Cones`.
-    least: normal loads are the least of their resultant.
     """
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd, ways)
     response = inertia.free(cones.rows.T)
     G, c, terms = product(cones.rows, response), cones.open, cones.terms
     b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
-    p, mode, mu = cones.solve(G + _stiffness(inertia, resting, G) if least else G, b)
+    p, mode, mu = cones.solve(G, b)
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
     _demand_unique(G, d, mu, mode)
     push = response @ p
@@ -467,14 +470,6 @@ def _solve(inertia, resting, qd, fired, by_rows=False, ways=MappingProxyType({})
             slack = slack_of(inertia, closed, shares, small)
             return state._replace(closed=closed, idle=idle, rows=rows, slack=slack, spread=spread), False, True
     return found
-
-
-def _stiffness(inertia, resting, G):
-    """What, added to G, takes loads without a resultant from normal reactions: z z^T of these loads z."""
-    loads, more = inertia.free(inertia.J[resting].T).T * inertia.gaps.levers(inertia.q), np.zeros_like(G)
-    z = null_space(loads.T, RANK_TOL)
-    more[::3, ::3] = np.diag(G)[::3].mean() * z @ z.T
-    return more
 
 
 def _sharing(G, b, p, mode, cones, response):

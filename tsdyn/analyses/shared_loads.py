@@ -64,6 +64,20 @@ def loads_of(gaps, closed, dependent):
     return S
 
 
+def lifts_of(gaps, closed, dependent, idle):
+    """Those idle that would carry if they were to pull, of groups, and minus these loads by those of closed ones."""
+    light, rows = [], [np.zeros((0, len(closed)))]
+    for members in groups_of(gaps, sorted([*closed, *idle])):
+        carry, off = [i for i in members if i in closed], [i for i in members if i in idle]
+        if off and len(carry) > 1 and rank_of(gaps, carry) == rank_of(gaps, members):
+            points = _points(gaps, [*carry, *off])
+            row = np.zeros((len(off), len(closed)))
+            share = least_squares(points[: len(carry)].T, points[len(carry) :].T, RANK_TOL).T
+            row[:, [closed.index(i) for i in carry]] = -share
+            light, rows = light + off, [*rows, row]
+    return light, np.concatenate(rows) @ loads_of(gaps, closed, dependent)
+
+
 def rows_of_closed(gaps, closed, dependent, values):
     """Of `values` (count, ...) of gaps those of the rows that hold closed ones: a mean where one row is of several."""
     found = values[[i for i in closed if i not in dependent]]

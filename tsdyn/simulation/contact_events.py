@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..analyses.contact_rows import load_rows, reaction_workspace, write_lam, write_rows
-from ..analyses.shared_loads import loads_of
+from ..analyses.shared_loads import lifts_of, loads_of
 from ..jit.kernels import Record, callback, kernel, loader, matrix, resident, vector
 from ..maths.tolerances import TINY
 from ..model.equations import recall
@@ -35,7 +35,7 @@ class ReactionParts(NamedTuple):
     normal: np.ndarray  # int64 (closed,)  rows of the gaps, -1 of one that depends on others,
     sign: np.ndarray  # (closed,)  and their signs over Phi
     slack: np.ndarray  # (closed,)
-    loads: np.ndarray  # (closed or 0, closed)  by `loads_of`, if rows depend on others
+    loads: np.ndarray  # (closed and light, closed), or none  by `loads_of` and `lifts_of`, if rows depend on others
     which: np.ndarray  # int64 (sticking,)  which of the closed stick
     slip: np.ndarray  # int64 (2 sticking,)  rows of their slips; -1 of one that depends on others
     static: np.ndarray  # (sticking,)
@@ -54,27 +54,36 @@ load_reactions = loader(ReactionParts(
 
 @callback(VALUES)
 def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: VALUES
-    """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique, nor shared."""
+    """out: as of `Reactions`; NaN where T isn't unique, nor shared."""
     c, x = load_parts(parts), load_reactions(own)
     closed, lam = x.normal.size, x.lam
-    values = vector(out, closed + x.which.size)
+    values = vector(out, max(closed, x.loads.shape[0]) + x.which.size)
     recall(c.system, x.memory)
     write_lam(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, lam)
     for i in range(closed):
         if x.loads.shape[0] == 0:
             values[i] = x.slack[i] - x.sign[i] * lam[x.normal[i]]
         else:
-            values[i] = x.slack[i]
-            for j in range(closed):
-                if x.normal[j] >= 0:
-                    values[i] -= x.loads[i, j] * x.sign[j] * lam[x.normal[j]]
+            values[i] = x.slack[i] + _load(x, i)
     for k in range(x.which.size):
         i, j = x.slip[2 * k], x.slip[2 * k + 1]
         T = math.hypot(lam[i], lam[j]) if i >= 0 and j >= 0 else math.nan
         values[closed + k] = x.static[k] * values[x.which[k]] - T
+    for i in range(closed, x.loads.shape[0]):
+        values[x.which.size + i] = _load(x, i)
     if x.own.size > 0:
         _share(x, values)
     return 0
+
+
+@kernel
+def _load(x, i):
+    """The load by row i of `loads`."""
+    total = 0.0
+    for j in range(x.normal.size):
+        if x.normal[j] >= 0:
+            total -= x.loads[i, j] * x.sign[j] * x.lam[x.normal[j]]
+    return total
 
 
 @kernel
@@ -113,7 +122,7 @@ def _share(x, values):
 class Reactions(KernelFunctions):
     """Reactions of closed contacts, positive where they push, and their slack, which they may fall below zero.
 
-    Then what is left to the bounds of those that stick.
+    Then what is left to the bounds of those that stick, and how much those that would pull lack to carry.
 
     Parameters
     ----------
@@ -129,7 +138,10 @@ class Reactions(KernelFunctions):
         first, rough = first_row_of(packed), bool(modes.grips)
         rows = [-1 if i in modes.dependent else first[id(gap_row(gaps, modes, i))] for i in self.closed]
         self.normal = np.array(rows, int)
-        self.loads = loads_of(gaps, self.closed, modes.dependent) if modes.dependent else _square
+        off = [i for i in modes.idle if modes.slides(i)] if all(map(modes.slides, modes.grips)) else []
+        self.light, lifts = lifts_of(gaps, self.closed, modes.dependent, off)
+        self.loads = np.concatenate([loads_of(gaps, self.closed, modes.dependent), lifts])
+        self.loads = self.loads if modes.dependent or self.light else _square
         self.slip = np.array([slip_columns(gaps.list[i], first) for i in self.sticks], int).reshape(-1, 2)
         self.which = np.array([self.closed.index(i) for i in self.sticks], int)
         self.smooth = np.flatnonzero(~gaps.rough[self.closed])
@@ -157,7 +169,7 @@ class Reactions(KernelFunctions):
                 self.limits, scratch,
             )
         )  # fmt: skip
-        count = len(self.closed) + len(self.sticks)
+        count = len(self.closed) + len(self.sticks) + len(self.light)
         return find_unit_reactions, self.workspace.address, own, count, memory
 
     @property
@@ -174,7 +186,7 @@ class Reactions(KernelFunctions):
             self.shares = True
         lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
         N = -self.gaps.sign[self.closed] * np.where(self.normal < 0, 0.0, lam[:, self.normal])
-        N = N @ self.loads.T if self.loads.size else N
+        N = N @ self.loads[: len(self.closed)].T if self.loads.size else N
         held, smooth = N[:, self.which], (np.array(self.closed)[self.smooth].tolist(), N[:, self.smooth])
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
         memory = np.tile(states.memory, (states.t.size, 1))

@@ -526,7 +526,7 @@ class _ContactRun(Transitions, Checkpoints):
         """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""
         gaps, modes = self.gaps, self.modes
         pushing, grips = Reactions(gaps, modes, packed), gaps.count + self.frictions.count
-        for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
+        for k, i in enumerate([*pushing.closed, *(grips + i for i in (*pushing.sticks, *pushing.light))]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
         known = {} if self.known is None else self.known_fast

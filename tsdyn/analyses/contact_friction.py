@@ -200,11 +200,14 @@ def _together(inertia, resting, found, qd, fired):
 
     Without those of them that would have to pull. What starts to slide does so along its acceleration.
     """
-    gaps, grips, slips, out = inertia.gaps, dict(found.grips), inertia.slips(qd), set()
-    alone, (c, terms) = inertia.slip_accelerations(qd), inertia.accelerations(qd)
+    gaps, grips, out = inertia.gaps, dict(found.grips), set()
     # What no longer pushes stays closed, if others hold it
-    still = [i for i in resting if i in fired and found.accelerations[i] <= LEVEL * terms[i] + inertia.carried()[i]]
-    light = [i for i in still if i not in found.held and slips[i].any() and depends(inertia, found.closed, i)]
+    light = [i for i in resting if i in fired and i not in found.held and depends(inertia, found.closed, i)]
+    if not (found.idle or light):
+        return None
+    slips, alone, (c, terms) = inertia.slips(qd), inertia.slip_accelerations(qd), inertia.accelerations(qd)
+    least = LEVEL * terms + inertia.carried()
+    light = [i for i in light if slips[i].any() and found.accelerations[i] <= least[i]]
     grips |= {i: inertia.along(i, slips[i] / np.hypot(*slips[i])) for i in light}
     held = sorted([*found.held, *light])
     groups = [members for members in groups_of(gaps, held) if all(grips[i] is not None for i in members)]

@@ -139,9 +139,10 @@ class Reactions(KernelFunctions):
         rows = [-1 if i in modes.dependent else first[id(gap_row(gaps, modes, i))] for i in self.closed]
         self.normal = np.array(rows, int)
         off = [i for i in modes.idle if modes.slides(i)] if all(map(modes.slides, modes.grips)) else []
-        self.light, lifts = lifts_of(gaps, self.closed, modes.dependent, off)
-        self.loads = np.concatenate([loads_of(gaps, self.closed, modes.dependent), lifts])
-        self.loads = self.loads if modes.dependent or self.light else _square
+        self.light, self.loads = [], _square
+        if off or modes.dependent:
+            self.light, lifts = lifts_of(gaps, self.closed, modes.dependent, off)
+            self.loads = np.concatenate([loads_of(gaps, self.closed, modes.dependent), lifts])
         self.slip = np.array([slip_columns(gaps.list[i], first) for i in self.sticks], int).reshape(-1, 2)
         self.which = np.array([self.closed.index(i) for i in self.sticks], int)
         self.smooth = np.flatnonzero(~gaps.rough[self.closed])

@@ -128,7 +128,7 @@ class Gaps:
 
     def __reduce__(self):
         """Made again in another process: the memory of kernels belongs to this one."""
-        return Gaps, self._made_of
+        return Gaps, self._made_of, {"together": self.together}
 
     def turns(self, body):
         """Whether a body may rotate, with all contacts open."""

@@ -61,7 +61,8 @@ from .unit_events import Breaking, Closing, Slowing
 # impact, where gaps close; those that are closed and at rest stay so as the complementarity problem of accelerations
 # says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg, are left out
 # of the rows: the others hold them. They may do so to first order alone, as the ends of an edge on a face that tips: a
-# gap that falls ends the run. Where those that stick need it, all share their reactions, see `UnitModes.spread`.
+# gap that falls ends the run. Where those that stick need it, all share their reactions, see `UnitModes.spread`; points
+# that slide on one plane do, and have friction by their shares, see analyses/shared_loads.py.
 #
 # `UnitModes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
 

@@ -112,6 +112,20 @@ def test_a_corner_that_lacks_load_carries_again_as_soon_as_it_can():
     np.testing.assert_allclose(loads[:, ends], loads[:, ends + 1], atol=1e-5)  # the slip of one turns as it is slow
 
 
+@pytest.mark.parametrize("force", [(6.0, 2.0), (10.0, 0.0)])
+def test_corners_that_begin_to_slide_do_so_against_their_friction(force):
+    """By their accelerations from rest, which follow from the loads, and these from the friction."""
+    scene, r = boxes(1, mu=0.3, size=(0.4, 0.4, 0.2)), np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)]) * 0.2
+    scene.add(ts.forces.PointForce(scene.bodies[0], point_a=(0.15, 0.2, -0.1), force=(*force, 0)))
+    solution = ts.simulate(scene, (0, 0.01))
+    loads = np.array([solution.reaction(contact)[0][0] for contact in scene.constraints[:4]])
+    np.testing.assert_allclose([loads[:, 2].sum(), loads[:, 2] @ (1, -1, -1, 1)], [G, 0.0], atol=1e-8)
+    turn = solution.angular_acceleration("0")[0, 2]
+    a = solution.acceleration("0")[0, :2] + turn * np.column_stack([-r[:, 1], r[:, 0]])
+    friction = -0.3 * loads[:, 2:] * a / np.linalg.norm(a, axis=1)[:, None]
+    np.testing.assert_allclose(loads[:, :2], friction, atol=1e-8)
+
+
 def test_a_square_box_that_spins_stays_where_it_is():
     """It slows down by mu m g r, r the half diagonal; each corner carries a quarter."""
     scene, J, r = boxes(1, mu=0.3, size=(0.4, 0.4, 0.2), spin=5.0), 0.4**2 / 6, 0.08**0.5

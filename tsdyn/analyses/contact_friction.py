@@ -34,6 +34,7 @@ from .tolerances import (
     PULLS,
     SECANTS,
     SLOWEST_SLIP,
+    WAYS,
     WITHIN_BOUND,
 )
 
@@ -211,7 +212,7 @@ def _together(inertia, resting, found, qd, fired):
     grips |= {i: inertia.along(i, slips[i] / np.hypot(*slips[i])) for i in light}
     held = sorted([*found.held, *light])
     groups = [members for members in groups_of(gaps, held) if all(grips[i] is not None for i in members)]
-    for _ in range(SECANTS * len(grips) if groups else 0):
+    for _ in range(WAYS if groups else 0):
         closed, dependent = _ranked(inertia, found, groups, out)
         if not (dependent or out):
             return None
@@ -243,7 +244,8 @@ def _together(inertia, resting, found, qd, fired):
                 return None
             out.add(worst)
         elif turned:
-            grips |= {i: inertia.along(i, way) for i, way in turned.items()}
+            between = {i: inertia.across(i, grips[i]) + way for i, way in turned.items()}  # whole steps may diverge
+            grips |= {i: inertia.along(i, way / np.hypot(*way)) for i, way in between.items()}
         else:
             break
     else:

@@ -1,5 +1,6 @@
 """Contacts with friction at the bound of sticking: closed forms of what holds, and of how a slip begins."""
 
+import copy
 import itertools
 
 import numpy as np
@@ -137,6 +138,20 @@ def test_a_gripper_that_weakens_lets_a_box_slip_when_all_points_are_at_their_bou
     """2 mu F = m g, F = 20 - 10 t."""
     solution = ts.simulate(gripper(10.0), (0, 1.1))
     assert abs(solution.phases[0][1] - (2.0 - G / 10.0)) < 1e-12
+
+
+def test_a_gripper_that_weakens_drops_a_box_without_a_turn():
+    """All eight points carry alike, m z'' = 8 mu N - m g with N = F / 4, F = 20 - 10 t."""
+    begin, end = 2.0 - G / 10.0, 1.1
+    solution = ts.simulate(gripper(10.0), (0, end), rtol=1e-12, atol=1e-12)
+    fall = (16.0 - G) * (end - begin) ** 2 / 2 - 4.0 * (end**3 / 3 - begin**2 * end + 2.0 * begin**3 / 3)
+    np.testing.assert_allclose(solution.position("box")[-1], [0, 0, fall], atol=1e-12)
+    assert np.abs(solution.angular_velocity("box")).max() < 1e-11
+    other = copy.deepcopy(solution)
+    for k, (side, name) in itertools.product(range(4), ((-1, "left"), (1, "right"))):
+        np.testing.assert_array_equal(other.reaction(f"{name}{k}")[0], solution.reaction(f"{name}{k}")[0])
+        load = (20.0 - 10.0 * end) / 4
+        np.testing.assert_allclose(solution.reaction(f"{name}{k}")[0][-1], [-side * load, 0, 0.4 * load], atol=1e-9)
 
 
 def two_slip_at_once(force):

@@ -6,7 +6,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import tsdyn as ts
+from tests.helpers.resuming import Stop
 from tests.helpers.rough_boxes import FLOOR, G, boxes
+from tsdyn.runs import driver
 
 C = ts.constraints
 BOXES = [
@@ -21,8 +23,11 @@ def corners(size):
     return np.array([(a, b, -h), (-a, b, -h), (-a, -b, -h), (a, -b, -h)])
 
 
-def slid(mu, size, legs, v, spin, t):
-    """Centroid and angle (3,) of a box that slides on three of its corners, by its equations in x, y and the angle."""
+def slid(mu, size, legs, v, spin, t, max_step=np.inf):
+    """Centroid and angle (3,) of a box that slides on corners, by its equations in x, y and the angle.
+
+    Loads are the least of their resultant: N = K y, K = (1, x_i, y_i), of those that needn't pull.
+    """
     m, (r, h) = 2.0, (corners(size)[legs], size[2] / 2)
     J, mu = m * (size[0] ** 2 + size[1] ** 2) / 12, np.array(mu)[legs]
 
@@ -31,15 +36,20 @@ def slid(mu, size, legs, v, spin, t):
         arm = r[:, :2] @ [[c, s], [-s, c]]
         u = y[3:5] + y[5] * np.column_stack([-arm[:, 1], arm[:, 0]])
         f = -mu[:, None] * u / np.linalg.norm(u, axis=1)[:, None]  # for N = 1, at h below the centroid
-        N = np.linalg.solve([np.ones(3), arm[:, 1] + h * f[:, 1], -arm[:, 0] - h * f[:, 0]], [m * G, 0, 0])
+        K, balance = np.column_stack([np.ones(len(arm)), arm]), np.array([1.0 + 0.0 * f[:, 0], *(arm + h * f).T])
+        N = K @ np.linalg.solve(balance @ K, [m * G, 0, 0])
+        while N.min() < 0.0:
+            K[N.argmin()] = 0.0
+            N = K @ np.linalg.solve(balance @ K, [m * G, 0, 0])
         return (*y[3:], *(N @ f / m), N @ (arm[:, 0] * f[:, 1] - arm[:, 1] * f[:, 0]) / J)
 
-    return solve_ivp(rates, (0, t), (0, 0, 0, *v, spin), "DOP853", rtol=1e-12, atol=1e-12).y[:3, -1]
+    start, options = (0, 0, 0, *v, spin), {"rtol": 1e-12, "atol": 1e-12, "max_step": max_step}
+    return solve_ivp(rates, (0, t), start, "DOP853", **options).y[:3, -1]
 
 
 @pytest.mark.parametrize(("mu", "size", "v", "spin"), BOXES)
 def test_a_box_on_corners_of_different_friction_slides_and_turns(mu, size, v, spin):
-    """It slides on three corners, one of the distributions that the rigid box leaves open, until all of it rests."""
+    """Loads are the least, of the distributions that the rigid box leaves open, until all of it rests."""
     scene = ts.Scene(gravity=(0, 0, -G))
     given = {**ts.shapes.box(size, mass=2.0), "position": (0, 0, size[2] / 2), "velocity": (*v, 0)}
     body = scene.add_body(**given, angular_velocity=(0, 0, spin), name="box")
@@ -61,19 +71,85 @@ def test_a_box_on_corners_of_different_friction_slides_and_turns(mu, size, v, sp
 
 
 def test_a_box_that_slides_and_turns_comes_to_rest_in_few_phases():
-    """Slips that end where they turn end at once; the box slides on three corners, by its equations."""
+    """Slips that end where they turn end at once; the box slides on all corners, by its equations."""
     size, scene = (0.6, 0.4, 0.2), boxes(1, mu=0.3, velocity=(1, 0, 0), spin=3.0)
     solution = ts.simulate(scene, (0, 1), rtol=1e-11, atol=1e-11, dense_output=True).raise_if_failed()
     assert np.count_nonzero(np.diff(solution.t) == 0.0) <= 5
     assert np.abs(solution.qd[-1]).max() == 0.0
-    contacts = scene.constraints[:4]
-    stands = [contact.point_a for contact in contacts if solution.reaction(contact)[0][0, 2] > 0]
-    legs = [np.argmin(np.linalg.norm(corners(size) - place, axis=1)) for place in stands]
-    assert len(legs) == 3
-    state = solution.at(0.05)  # other corners carry it later
+    state = solution.at(0.3)
     R = state.rotation("0")
     found = *state.position("0")[:2], np.arctan2(R[1, 0], R[0, 0])
-    np.testing.assert_allclose(found, slid([0.3] * 4, size, legs, (1, 0), 3.0, 0.05), atol=1e-9)
+    np.testing.assert_allclose(found, slid([0.3] * 4, size, range(4), (1, 0), 3.0, 0.3), atol=1e-10)
+
+
+@pytest.mark.parametrize("size", [(0.4, 0.4, 0.2), (0.5, 0.3, 0.3)])
+def test_a_box_that_slides_and_turns_is_carried_by_all_corners(size):
+    """The floor takes work by the friction of all four."""
+    scene = boxes(1, mu=0.3, size=size, velocity=(1, 0.3, 0), spin=5.0)
+    solution = ts.simulate(scene, (0, 0.5), rtol=1e-11, atol=1e-11, dense_output=True)
+    state = solution.at(0.3)
+    R = state.rotation("0")
+    found = *state.position("0")[:2], np.arctan2(R[1, 0], R[0, 0])
+    np.testing.assert_allclose(found, slid([0.3] * 4, size, range(4), (1, 0.3), 5.0, 0.3), atol=1e-10)
+    loads = np.array([state.reaction(contact)[0][2] for contact in scene.constraints[:4]])
+    np.testing.assert_allclose([loads.sum(), loads @ (1, -1, -1, 1)], [G, 0.0], atol=1e-10)
+    np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=1e-12)
+    assert not solution.qd[-1].any()
+
+
+def test_a_corner_that_lacks_load_carries_again_as_soon_as_it_can():
+    """Each of three corners has none for a while; it would have to pull."""
+    size, v, spin = (0.4, 0.4, 0.65), (2, 0.3), 8.0
+    scene = boxes(1, mu=0.6, size=size, velocity=(*v, 0), spin=spin)
+    solution = ts.simulate(scene, (0, 0.4), rtol=1e-11, atol=1e-11, dense_output=True)
+    R = solution.rotation("0")[-1]
+    found = *solution.position("0")[-1, :2], np.arctan2(R[1, 0], R[0, 0])
+    np.testing.assert_allclose(found, slid([0.6] * 4, size, range(4), v, spin, 0.4, 2e-3), atol=1e-9)
+    loads = np.array([solution.reaction(contact)[0][:, 2] for contact in scene.constraints[:4]])
+    assert loads.min() > -1e-9
+    assert ((loads < 1e-9).sum(axis=1) > 1).sum() == 3
+    ends = np.flatnonzero(np.diff(solution.t) == 0.0)
+    np.testing.assert_allclose(loads[:, ends], loads[:, ends + 1], atol=1e-5)  # the slip of one turns as it is slow
+
+
+@pytest.mark.parametrize("force", [(6.0, 2.0), (10.0, 0.0)])
+def test_corners_that_begin_to_slide_do_so_against_their_friction(force):
+    """By their accelerations from rest, which follow from the loads, and these from the friction."""
+    scene, r = boxes(1, mu=0.3, size=(0.4, 0.4, 0.2)), np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)]) * 0.2
+    scene.add(ts.forces.PointForce(scene.bodies[0], point_a=(0.15, 0.2, -0.1), force=(*force, 0)))
+    solution = ts.simulate(scene, (0, 0.01))
+    loads = np.array([solution.reaction(contact)[0][0] for contact in scene.constraints[:4]])
+    np.testing.assert_allclose([loads[:, 2].sum(), loads[:, 2] @ (1, -1, -1, 1)], [G, 0.0], atol=1e-8)
+    turn = solution.angular_acceleration("0")[0, 2]
+    a = solution.acceleration("0")[0, :2] + turn * np.column_stack([-r[:, 1], r[:, 0]])
+    friction = -0.3 * loads[:, 2:] * a / np.linalg.norm(a, axis=1)[:, None]
+    np.testing.assert_allclose(loads[:, :2], friction, atol=1e-8)
+
+
+def test_a_square_box_that_spins_stays_where_it_is():
+    """It slows down by mu m g r, r the half diagonal; each corner carries a quarter."""
+    scene, J, r = boxes(1, mu=0.3, size=(0.4, 0.4, 0.2), spin=5.0), 0.4**2 / 6, 0.08**0.5
+    solution = ts.simulate(scene, (0, 0.5))
+    np.testing.assert_allclose(solution.phases[0][1], J * 5.0 / (0.3 * G * r), rtol=1e-12)
+    assert np.abs(solution.position("0") - [0, 0, 0.1]).max() < 1e-15
+    for contact in scene.constraints[:4]:
+        slides = ~solution.sticking(contact)
+        np.testing.assert_allclose(solution.reaction(contact)[0][slides, 2], G / 4, rtol=1e-12)
+
+
+def test_a_box_that_slides_and_turns_goes_on_from_a_checkpoint_to_the_same_bits(tmp_path, monkeypatch):
+    def box():
+        return boxes(1, mu=0.4, size=(0.4, 0.4, 0.5), velocity=(2, 1, 0), spin=5.0)
+
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
+    whole = ts.simulate(box(), (0, 1))
+    for stop in (2, 4):
+        path = tmp_path / f"run {stop}.h5"
+        stopped = ts.simulate(box(), (0, 1), store=path, checkpoint=0.0, progress=Stop(stop))
+        assert stopped.status is ts.Status.INTERRUPTED
+        resumed = ts.resume(path)
+        np.testing.assert_array_equal(resumed.q, whole.q)
+        assert resumed.phases == whole.phases
 
 
 def test_slips_that_turn_while_they_end_make_few_events():
@@ -93,7 +169,7 @@ def test_slips_that_turn_while_they_end_make_few_events():
     [(0.3, (0.6, 0.2, 0.2), (0.9, 0.4), -1.4, 0.2), (0.43, (0.6, 0.4, 0.6), (-0.2, 0.2), 1.4, 0.02)],
 )
 def test_corners_of_a_box_that_slides_and_turns_push(mu, size, v, spin, slides):
-    """Loads of four corners that slide are independent, their rows are not: only some three of them push."""
+    """Loads are the least; where one would have to pull, three corners carry the box."""
     scene = boxes(1, mu=mu, size=size, velocity=(*v, 0), spin=spin)
     contacts = scene.constraints[:4]
     solution = ts.simulate(scene, (0, 0.5), rtol=1e-10, atol=1e-10, dense_output=True).raise_if_failed()

@@ -21,6 +21,7 @@ from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.dense_solve import least_squares, null_space, product
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
+from .shared_loads import groups_of, loads_of, rank_of, rows_of_closed
 from .tolerances import (
     AHEAD,
     EVENT_ERROR,
@@ -33,6 +34,7 @@ from .tolerances import (
     PULLS,
     SECANTS,
     SLOWEST_SLIP,
+    WAYS,
     WITHIN_BOUND,
 )
 
@@ -158,6 +160,8 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     for by_rows in False, True:
         found, pulls, moves_so = _solve(inertia, resting, qd, fired, by_rows)
         carries = found.spread and moves_so
+        if (found.idle or len(fired)) and not carries and (shared := _together(inertia, resting, found, qd, fired)):
+            return shared
         if found.idle and not carries and (alone := _alone(inertia, found, qd, fired)):
             return alone
         if not pulls:
@@ -190,6 +194,99 @@ def _alone(inertia, found, qd, fired):
             return None if pulls else again._replace(idle=sorted([*again.idle, *idle]), grips=grips)
         which = sorted([*again.closed, *again.idle, min(missing, key=again.accelerations.item)])
     return None
+
+
+def _together(inertia, resting, found, qd, fired):
+    """The `ContactState` in which contacts that slide share their loads, see shared_loads.py, or None.
+
+    Without those of them that would have to pull. What starts to slide does so along its acceleration.
+    """
+    gaps, grips, out = inertia.gaps, dict(found.grips), set()
+    # What no longer pushes stays closed, if others hold it
+    light = [i for i in resting if i in fired and i not in found.held and depends(inertia, found.closed, i)]
+    if not (found.idle or light):
+        return None
+    slips, alone, (c, terms) = inertia.slips(qd), inertia.slip_accelerations(qd), inertia.accelerations(qd)
+    least = LEVEL * terms + inertia.carried()
+    light = [i for i in light if slips[i].any() and found.accelerations[i] <= least[i]]
+    grips |= {i: inertia.along(i, slips[i] / np.hypot(*slips[i])) for i in light}
+    held = sorted([*found.held, *light])
+    groups = [members for members in groups_of(gaps, held) if all(grips[i] is not None for i in members)]
+    for _ in range(WAYS if groups else 0):
+        closed, dependent = _ranked(inertia, found, groups, out)
+        if not (dependent or out):
+            return None
+        which = sorted([*closed, *dependent])
+        sticks = [i for i in closed if gaps.rough[i] and grips[i] is None]
+        shares = loads_of(gaps, which, dependent)[:, np.isin(which, closed)]
+        tangents = inertia.tangents[sticks].reshape(-1, inertia.q.size)
+        loads = np.concatenate([product(shares.T, _loads(inertia, which, _ways(inertia, grips))), tangents])
+        response = inertia.free(loads.T)
+        rows, a = (rows_of_closed(gaps, which, dependent, x) for x in (inertia.J, c))
+        A = product(np.concatenate([rows, tangents]), response)
+        p = -least_squares(A, np.concatenate([a, alone[sticks].ravel()]), RANK_TOL**2)
+        if (np.linalg.eigvals(A).real < -RANK_TOL * np.abs(A).max()).any():
+            return None
+        N, T, push = shares @ p[: len(closed)], np.hypot(*p[len(closed) :].reshape(-1, 2).T), response @ p
+        small = LEVEL * (terms + np.abs(product(inertia.J, response)) @ np.abs(p)) + inertia.carried()
+        rounding = np.maximum(small[which] / inertia.G[which, which], EVENT_ERROR * N.max())
+        least = np.where(np.isin(which, fired) & (N - rounding <= 0.0), -np.inf, N + rounding)
+        moves, pace = alone + inertia.tangents @ push, np.abs(alone) + np.abs(inertia.tangents @ response) @ np.abs(p)
+        gain, least_gain = np.hypot(*moves.T), EVENT_ERROR * pace.max(axis=1)
+        begins = [i for i in which if grips.get(i) is not None and not slips[i].any()]
+        if (gain[begins] <= least_gain[begins]).any():
+            return None
+        ways = {i: moves[i] / gain[i] for i in begins}
+        turned = {i: way for i, way in ways.items() if abs(_cross(inertia.across(i, grips[i]), way)) > EVENT_ERROR}
+        worst = which[least.argmin()]
+        if least.min() < 0.0:
+            if not any(worst in members for members in groups):
+                return None
+            out.add(worst)
+        elif turned:
+            between = {i: inertia.across(i, grips[i]) + way for i, way in turned.items()}  # whole steps may diverge
+            grips |= {i: inertia.along(i, way / np.hypot(*way)) for i, way in between.items()}
+        else:
+            break
+    else:
+        return None
+    left, gdd = (1.0 - EVENT_ERROR) * gaps.static[sticks] * N[np.isin(which, sticks)] - T, c + inertia.J @ push
+    others = [i for i in inertia.which if i not in which]
+    if (left < 0.0).any() or (gdd[others] < -small[others]).any():
+        return None
+    gains, begun = {i: moves[i] for i in held if slips[i].any()}, {i: float(gain[i]) for i in ways}
+    idle = [i for i in held if i not in closed]
+    slack = slack_of(inertia, which, N, small)
+    return ContactState(
+        closed, idle, gdd, push, grips, found.rows, slack, gains, begun, found.slow, dependent=tuple(dependent)
+    )
+
+
+def _ranked(inertia, found, groups, out):
+    """Closed gaps whose rows are independent, and those that share loads with them: of groups, but those that are out.
+
+    Groups go whose rows may depend on others at this instant alone.
+    """
+    gaps, closed, dependent, held = inertia.gaps, [], [], []
+    closed += [i for i in found.closed if not any(i in members for members in groups)]
+    for members in list(groups):
+        own, first = [i for i in members if i not in out], len(closed)
+        if not own:
+            continue
+        rest, law, n = [], gaps.list[own[0]].side.grip.sliding, inertia.normal(own[0])
+        for i in sorted(own, key=lambda i: i not in found.closed):
+            (rest if depends(inertia, closed, i) else closed).append(i)
+        rank = len(closed) - first
+        along = (a is law.a and np.abs(np.cross(z, n)).max() < HALF_DIGITS for a, z in held)
+        if rank == rank_of(gaps, own):
+            dependent += rest
+            held += [(law.a, n)] if rank == 3 and not gaps.turns(law.b) else []
+        elif rank == 1 and not gaps.turns(law.b) and (any(along) or not gaps.turns(law.a)):
+            dependent += rest
+        else:
+            groups.remove(members)
+            return _ranked(inertia, found, groups, out)
+    return sorted(closed), dependent
 
 
 def at_turn(inertia, resting, qd, fired, turned, opening=()):

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
 from ..elements.bodies import turning
+from ..formulations.locked_orientations import still
 from ..maths.complementarity import complement
 from ..maths.dense_solve import least_squares, product
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
@@ -103,6 +104,7 @@ class Gaps:
         self.stops = Stops(*of_stops, handles.joints.ravel(), handles.frames)
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
         self._lengths = None, None  # a length, and `lengths` of it
+        self.together = {}  # friction of contacts that share their loads, see grips.py
 
     def extent(self, q):
         """The scene's length at q (n,), m: of points and positions the one farthest off; where there is none, one."""
@@ -126,7 +128,13 @@ class Gaps:
 
     def __reduce__(self):
         """Made again in another process: the memory of kernels belongs to this one."""
-        return Gaps, self._made_of
+        return Gaps, self._made_of, {"together": self.together}
+
+    def turns(self, body):
+        """Whether a body may rotate, with all contacts open."""
+        packed = self._made_of[2]
+        locked = [packed.bodies[i] for i in still(packed).bodies]
+        return body.dimension == 7 and not any(body is each for each in locked)
 
     @property
     def workspace(self):
@@ -327,6 +335,11 @@ class Inertia:
         qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
         return qdd + self._more, gamma
 
+    def normal(self, i):
+        """The normal (3,) of a contact with friction, ground frame."""
+        _, at, sign = self.gaps.slips([i])
+        return sign * self.J[i, at[0] : at[0] + 3]
+
     def across(self, i, d):
         """Components (2,) of a direction d (3,), ground frame, along the slips of a gap."""
         return self.gaps.across(i, self.tangents[i], d)
@@ -395,6 +408,12 @@ class ContactState(NamedTuple):
     begun: dict = MappingProxyType({})  # the size of these, of those that begin to slide, above rounding
     slow: np.ndarray | None = None  # (count,) slips, m/s, below which friction keeps a direction
     spread: dict = MappingProxyType({})  # of closed and idle ones, see contact_friction.py
+    dependent: tuple = ()  # idle ones that carry, too, see shared_loads.py
+
+    @property
+    def held(self):
+        """Closed and idle ones, a sorted list."""
+        return sorted([*self.closed, *self.idle])
 
 
 def solve_contacts(inertia, resting, qd, fired=()):

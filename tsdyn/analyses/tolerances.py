@@ -136,6 +136,8 @@ AHEAD = 3e-7
 SLOWEST_SLIP, LEAST_SLIP = 1e-2, 1e-5
 # Cosine of the turn of a slow slip from which on it may take the direction between, 8 degrees at an event; steps to it.
 NEAR_WAY, SECANTS = 0.98, 3
+# Steps to the directions in which slips of contacts that share their loads begin: half of the turn that is left each.
+WAYS = 64
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
 # Of the largest reaction: contacts that carry less share changes of the load as if they carried this.

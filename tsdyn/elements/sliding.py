@@ -10,6 +10,11 @@ k is the contact point from x_a: an ellipsoid of semi-axes a_j along e_j, thicke
 opposite on b. N is the normal reaction, with its sign: a step beyond an opening is regular. e is v / |v| while v is
 within 90 degrees of d, a slow slip that a run sets, and has its direction in the tangent plane where |v| is far below
 |d|: so the force is analytic where the slip begins and ends.
+
+Where rows of contacts between the same bodies depend on each other, those of some hold the gaps, and all carry: N is a
+share of the force F and the torque T about x_a that these rows exert on a,
+
+    N = n.(c F + T x h),  h fixed in a                                                            (5)
 """
 
 from __future__ import annotations
@@ -24,9 +29,10 @@ from ..jit.predicates import some
 from ..maths.recurrences import cross, dot, inverse_root, product, scaled
 from .force import Force
 from .friction import HEADING_ROWS, TANGENTIAL_ROWS, heading, heading_series, tangential, tangential_series
-from .markers import Point, Turn, Vector
+from .markers import TURN, Point, Turn, Vector
 
 MU, SIDE, AXES, TYRE, BALLS, WAY = 0, 1, 2, 5, 6, 7  # where these begin in par; then N
+SHARE, LEVER = 3, 4  # c and |h| of Eq. (5), in place of semi-axes
 A, B, Z, E = 0, 6, 12, 15  # where x_a, x_b, z and e_1 begin in x; a Turn follows each point
 
 
@@ -137,6 +143,57 @@ class _SlidingSurface(_Sliding):
     """The same of an ellipsoid, or a disc or torus."""
 
     markers = (*_Sliding.markers, *(Vector("a", name) for name in ("first_a", "second_a", "third_a")))
+
+
+class _SlidingTogether(_Sliding):
+    """The same of a point that shares its load with others.
+
+    Parameters
+    ----------
+    of : _Sliding
+        Its friction by a row of its own.
+    reads : tuple of Primitive
+        The rows that hold the gaps.
+    share : float
+        c of Eq. (5).
+    lever : ndarray (3,), 1/m
+        h, frame of a.
+    """
+
+    markers = (*_Sliding.markers, Vector("a", "lever_a"))
+
+    def __init__(self, of, reads, share, lever):
+        size = float(np.linalg.norm(lever))
+        places = {marker.argument: getattr(of, marker.argument) for marker in of.markers if marker.code != TURN}
+        places["lever_a"] = lever if size > 0.0 else (1.0, 0.0, 0.0)
+        super().__init__(of.joint, kinetic=of.kinetic, tyre_radius=of.tyre_radius, **places, name=of.name)
+        self.__dict__.update(of=of, reads=reads, share=share, size=size)
+
+    def parameters(self):
+        """As of `_Sliding`, with c and |h|; it is on a."""
+        return self.kinetic, 1.0, 0.0, self.share, self.size, self.tyre_radius, 0.0
+
+    @staticmethod
+    def normal_load(x, f, par):
+        """Eq. (5)."""
+        c, h = par[SHARE], par[LEVER]
+        N = x[Z] * (c * f[0] + h * (f[4] * x[E + 2] - f[5] * x[E + 1]))
+        N += x[Z + 1] * (c * f[1] + h * (f[5] * x[E] - f[3] * x[E + 2]))
+        return N + x[Z + 2] * (c * f[2] + h * (f[3] * x[E + 1] - f[4] * x[E]))
+
+    series = staticmethod(_Sliding.series)
+
+    @staticmethod
+    def normal_series(x, f, par, k, s):
+        """Of Eq. (5)."""
+        # n (3), T (32), direction of h (35), c F + T x h (49)
+        for i in range(3):
+            s[3 + i, k], s[32 + i, k], s[35 + i, k] = x[Z + i], f[3 + i], x[E + i]
+        u0, u1, u2 = cross(s, 32, 35, k)
+        s[49, k] = par[SHARE] * f[0] + par[LEVER] * u0
+        s[50, k] = par[SHARE] * f[1] + par[LEVER] * u1
+        s[51, k] = par[SHARE] * f[2] + par[LEVER] * u2
+        return dot(s, 3, 49, k)
 
 
 @kernel

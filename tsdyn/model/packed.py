@@ -380,7 +380,7 @@ def frictions_of(packed, bodies, rows_of, sides):
     for load in found:
         force, first = load.force, len(rows)
         on = 0 if force.on is force.a else 1
-        for part in packed.constraints[members[id(force.joint)].parts]:
+        for part in parts_read(packed, members, force):
             rows += [(e, int(sides[e, 1] == bodies[id(force.on)])) for e in rows_of(part)]
         kind, index = _place(packed.system.forces, load.alone[0])
         loops = (address(force.kernels, name, force.name, InvalidForce) for name in ("unit_friction", "normal_load"))
@@ -389,6 +389,12 @@ def frictions_of(packed, bodies, rows_of, sides):
         frictions.append([*pair, on, first, len(rows) - first, kind, index, *loops, kept, room])
         kept += room
     return records(FrictionPlace, frictions), np.array(rows, np.int64).reshape(-1, 2)
+
+
+def parts_read(packed, members, force):
+    """Yield the primitives whose reactions a friction depends on; members: by the ids of constraints."""
+    for joint in getattr(force, "reads", (force.joint,)):
+        yield from packed.constraints[members[id(joint)].parts]
 
 
 def _place(kinds, row):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..analyses.contact_rows import load_rows, reaction_workspace, write_lam, write_rows
+from ..analyses.shared_loads import lifts_of, loads_of
 from ..jit.kernels import Record, callback, kernel, loader, matrix, resident, vector
 from ..maths.tolerances import TINY
 from ..model.equations import recall
@@ -31,9 +32,10 @@ class ReactionParts(NamedTuple):
 
     numbers: ReactionNumbers
     memory: np.ndarray  # what forces remember
-    normal: np.ndarray  # int64 (closed,)  rows of the gaps,
+    normal: np.ndarray  # int64 (closed,)  rows of the gaps, -1 of one that depends on others,
     sign: np.ndarray  # (closed,)  and their signs over Phi
     slack: np.ndarray  # (closed,)
+    loads: np.ndarray  # (closed and light, closed), or none  by `loads_of` and `lifts_of`, if rows depend on others
     which: np.ndarray  # int64 (sticking,)  which of the closed stick
     slip: np.ndarray  # int64 (2 sticking,)  rows of their slips; -1 of one that depends on others
     static: np.ndarray  # (sticking,)
@@ -43,30 +45,45 @@ class ReactionParts(NamedTuple):
     lam: np.ndarray  # (m,)  scratch
 
 
-_none, _whole = np.zeros(0), np.zeros(0, int)
+_none, _whole, _square = np.zeros(0), np.zeros(0, int), np.zeros((0, 0))
 load_reactions = loader(ReactionParts(
-        ReactionNumbers(), _none, _whole, _none, _none, _whole, _whole, _none, _whole, np.zeros((0, 0)), _none, _none
+        ReactionNumbers(), _none, _whole, _none, _none, _square, _whole, _whole, _none, _whole, _square, _none, _none
     )
 )  # fmt: skip
 
 
 @callback(VALUES)
 def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: VALUES
-    """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique, nor shared."""
+    """out: as of `Reactions`; NaN where T isn't unique, nor shared."""
     c, x = load_parts(parts), load_reactions(own)
     closed, lam = x.normal.size, x.lam
-    values = vector(out, closed + x.which.size)
+    values = vector(out, max(closed, x.loads.shape[0]) + x.which.size)
     recall(c.system, x.memory)
     write_lam(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, lam)
     for i in range(closed):
-        values[i] = x.slack[i] - x.sign[i] * lam[x.normal[i]]
+        if x.loads.shape[0] == 0:
+            values[i] = x.slack[i] - x.sign[i] * lam[x.normal[i]]
+        else:
+            values[i] = x.slack[i] + _load(x, i)
     for k in range(x.which.size):
         i, j = x.slip[2 * k], x.slip[2 * k + 1]
         T = math.hypot(lam[i], lam[j]) if i >= 0 and j >= 0 else math.nan
         values[closed + k] = x.static[k] * values[x.which[k]] - T
+    for i in range(closed, x.loads.shape[0]):
+        values[x.which.size + i] = _load(x, i)
     if x.own.size > 0:
         _share(x, values)
     return 0
+
+
+@kernel
+def _load(x, i):
+    """The load by row i of `loads`."""
+    total = 0.0
+    for j in range(x.normal.size):
+        if x.normal[j] >= 0:
+            total -= x.loads[i, j] * x.sign[j] * x.lam[x.normal[j]]
+    return total
 
 
 @kernel
@@ -105,7 +122,7 @@ def _share(x, values):
 class Reactions(KernelFunctions):
     """Reactions of closed contacts, positive where they push, and their slack, which they may fall below zero.
 
-    Then what is left to the bounds of those that stick.
+    Then what is left to the bounds of those that stick, and how much those that would pull lack to carry.
 
     Parameters
     ----------
@@ -119,7 +136,13 @@ class Reactions(KernelFunctions):
         self.gaps, self.packed, self.closed = gaps, packed, modes.closed
         self.sticks = [i for i in modes.closed if modes.sticks(i)]
         first, rough = first_row_of(packed), bool(modes.grips)
-        self.normal = np.array([first[id(gap_row(gaps, modes, i))] for i in self.closed], int)
+        rows = [-1 if i in modes.dependent else first[id(gap_row(gaps, modes, i))] for i in self.closed]
+        self.normal = np.array(rows, int)
+        off = [i for i in modes.idle if modes.slides(i)] if all(map(modes.slides, modes.grips)) else []
+        self.light, self.loads = [], _square
+        if off or modes.dependent:
+            self.light, lifts = lifts_of(gaps, self.closed, modes.dependent, off)
+            self.loads = np.concatenate([loads_of(gaps, self.closed, modes.dependent), lifts])
         self.slip = np.array([slip_columns(gaps.list[i], first) for i in self.sticks], int).reshape(-1, 2)
         self.which = np.array([self.closed.index(i) for i in self.sticks], int)
         self.smooth = np.flatnonzero(~gaps.rough[self.closed])
@@ -143,11 +166,11 @@ class Reactions(KernelFunctions):
         own, *self._keep = resident(
             ReactionParts(
                 ReactionNumbers(redundant=self.redundant), memory, self.normal, self.gaps.sign[self.closed], self.slack,
-                self.which, self.slip.ravel(), self.gaps.static[self.sticks], self.own, self.spread, self.limits,
-                scratch,
+                self.loads, self.which, self.slip.ravel(), self.gaps.static[self.sticks], self.own, self.spread,
+                self.limits, scratch,
             )
         )  # fmt: skip
-        count = len(self.closed) + len(self.sticks)
+        count = len(self.closed) + len(self.sticks) + len(self.light)
         return find_unit_reactions, self.workspace.address, own, count, memory
 
     @property
@@ -163,7 +186,8 @@ class Reactions(KernelFunctions):
                 return values
             self.shares = True
         lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
-        N = -self.gaps.sign[self.closed] * lam[:, self.normal]
+        N = -self.gaps.sign[self.closed] * np.where(self.normal < 0, 0.0, lam[:, self.normal])
+        N = N @ self.loads[: len(self.closed)].T if self.loads.size else N
         held, smooth = N[:, self.which], (np.array(self.closed)[self.smooth].tolist(), N[:, self.smooth])
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
         memory = np.tile(states.memory, (states.t.size, 1))

@@ -63,7 +63,8 @@ from .unit_events import Breaking, Closing, Slowing
 # impact, where gaps close; those that are closed and at rest stay so as the complementarity problem of accelerations
 # says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg, are left out
 # of the rows: the others hold them. They may do so to first order alone, as the ends of an edge on a face that tips: a
-# gap that falls ends the run. Where those that stick need it, all share their reactions, see `UnitModes.spread`.
+# gap that falls ends the run. Where those that stick need it, all share their reactions, see `UnitModes.spread`; points
+# that slide on one plane do, and have friction by their shares, see analyses/shared_loads.py.
 #
 # `UnitModes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
 
@@ -533,7 +534,7 @@ class _ContactRun(Transitions, Checkpoints):
         """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""
         gaps, modes = self.gaps, self.modes
         pushing, grips = Reactions(gaps, modes, packed), gaps.count + self.frictions.count
-        for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
+        for k, i in enumerate([*pushing.closed, *(grips + i for i in (*pushing.sticks, *pushing.light))]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
         known = {} if self.known is None else self.known_fast

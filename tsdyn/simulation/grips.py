@@ -4,9 +4,12 @@ import numpy as np
 
 from ..analyses.contact_friction import share
 from ..analyses.contact_problem import slip_rows
+from ..analyses.shared_loads import law_of, loads_of, shares_of
 from ..analyses.tolerances import EVENT_ERROR, LEAST_SLIP
 from ..elements.bodies import rotation_matrix
+from ..elements.element import stop_waiting
 from ..elements.friction import heading
+from ..elements.sliding import _SlidingTogether
 from ..jit.kernels import twin
 from ..model.handles import index_of
 from ..observables.reactions import balancing
@@ -22,17 +25,50 @@ from .tolerances import SAME_WAY
 
 def items_of(gaps, modes):
     """The rows that hold closed contacts, and the forces of those that slide."""
-    items = []
+    items, shared = [], {}
+    for members, own, shares in shares_of(gaps, modes.closed, modes.dependent):
+        shared |= {i: _together(gaps, members, own, i, row) for i, row in zip(members, shares, strict=True)}
     for i in modes.closed:
         gap = gaps.list[i]
         if modes.slides(i):
-            items += gap.side.grip[:2]
+            items += [] if i in modes.dependent else [gap_row(gaps, modes, i)]
+            items.append(shared.get(i, gap.side.grip.sliding))
         elif modes.sticks(i):
             first, *others = gap.parts
             items += [first, *(part for part, held in zip(others, modes.grips[i], strict=False) if held)]
         else:
             items.append(gap.side.row)
     return items
+
+
+def _together(gaps, members, own, i, shares):
+    """The friction of a contact that carries shares (r,) of the reactions of others; the same for the same ones."""
+    key = i, *members, *own
+    if key not in gaps.together:
+        reads = [gaps.list[j].side.grip.gap for j in own] if len(own) > 1 else [_mean_row(gaps, members)]
+        gaps.together[key] = _SlidingTogether(gaps.list[i].side.grip.sliding, reads, *law_of(gaps, i, own, shares))
+        stop_waiting(gaps.together[key])
+    return gaps.together[key]
+
+
+def _mean_row(gaps, members):
+    """The row of the mean of points on a plane; the same for the same ones."""
+    key = tuple(members)
+    if key not in gaps.together:
+        row, points = gaps.list[members[0]].side.grip.gap, [gaps.list[i].side.grip.gap.point_a for i in members]
+        places = {"point_a": np.mean(points, axis=0), "point_b": row.point_b, "normal_b": row.normal_b}
+        gaps.together[key] = type(row)(row.a, row.b, **places)
+        stop_waiting(gaps.together[key])
+    return gaps.together[key]
+
+
+def normal_loads(gaps, modes, first, lam):
+    """Loads (k, closed), those that push positive, by the multipliers lam (k, rows) of a phase."""
+    own = [i not in modes.dependent for i in modes.closed]
+    rows = [first[id(gap_row(gaps, modes, i))] for i in modes.closed if i not in modes.dependent]
+    found = np.zeros((len(lam), len(own)))
+    found[:, own] = -gaps.sign[modes.closed][own] * lam[:, rows]
+    return found @ loads_of(gaps, modes.closed, modes.dependent).T if modes.dependent else found
 
 
 def held_point(packed, part, q):
@@ -79,6 +115,9 @@ def stopping_time(inertia, which, qd, after, qdd, slow):
 def gap_row(gaps, modes, i):
     """The primitive whose first row is the gap of a closed contact in a phase."""
     gap = gaps.list[i]
+    for members, own, _ in shares_of(gaps, modes.closed, modes.dependent):
+        if own == [i]:
+            return _mean_row(gaps, members)
     return gap.side.grip.gap if modes.slides(i) else gap.side.row
 
 
@@ -128,11 +167,12 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
     if not frictional:
         return
     first = first_row_of(packed)
-    N = np.array([-gaps.sign[i] * lam[:, first[id(gap_row(gaps, modes, i))]] for i in frictional]).T
+    loads = normal_loads(gaps, modes, first, lam)
+    N = loads[:, gaps.rough[modes.closed]]
     tangents = np.array([gaps.slopes(*pair, frictional) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
     rows = gaps.slip_rows[frictional]
     smooth = [i for i in modes.closed if not gaps.rough[i]]
-    M = -gaps.sign[smooth] * lam[:, [first[id(gap_row(gaps, modes, i))] for i in smooth]]
+    M = loads[:, ~gaps.rough[modes.closed]]
     sticks = [j for j, i in enumerate(frictional) if modes.sticks(i)]
     if sticks:
         T = -out[:, rows[sticks]]
@@ -153,7 +193,7 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
                 f = np.einsum("kc,kcn->kn", more, normals) + np.einsum("kci,kcin->kn", T - alone, tangents[:, sticks])
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
-            pushing = [first[id(gap_row(gaps, modes, i))] for i in (*frictional, *smooth)]
+            pushing = [first[id(gap_row(gaps, modes, i))] for i in modes.closed if i not in modes.dependent]
             moves = np.abs(change[:, pushing]).max(axis=1) > EVENT_ERROR * np.abs(N).max(axis=1)
             change[moves], T[moves], others[moves] = 0.0, alone[moves], M[moves]
             for j, i in enumerate(sticks):

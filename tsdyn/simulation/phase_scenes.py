@@ -174,15 +174,20 @@ def _remembering(packed, whole):
     pairs = zip(packed.constraints, packed.slots, strict=True)
     return packed._replace(
         system=packed.system._replace(memory=memory, reals=np.append(packed.system.reals, np.zeros(size))),
-        loads=tuple(load if load.slot < 0 else load._replace(slot=first[id(load.force)]) for load in packed.loads),
+        loads=tuple(load if load.slot < 0 else load._replace(slot=first[_owner(load.force)]) for load in packed.loads),
         slots=tuple(slot if slot < 0 else first[id(part)] for part, slot in pairs),
         contacts=whole.contacts,
     )
 
 
+def _owner(force):
+    """The id of the force whose memory it is: friction of a contact, by its own reaction or as it shares those."""
+    return id(getattr(force, "of", force))
+
+
 def _slots(packed):
     """The slots of System.memory of each force and primitive that has any, a slice, by its id."""
-    owners = [(load.slot, id(load.force)) for load in packed.loads]
+    owners = [(load.slot, _owner(load.force)) for load in packed.loads]
     owners += zip(packed.slots, map(id, packed.constraints), strict=True)
     owners += ((slot, id(contact)) for contact, slot in packed.contacts)
     owners = sorted(owner for owner in owners if owner[0] >= 0)

@@ -23,7 +23,7 @@ from .grips import add_friction, losses
 class UnitModes:
     """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
 
-    closed: list = field(default_factory=list)  # independent rows, with reactions
+    closed: list = field(default_factory=list)  # with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
     opened: dict = field(default_factory=dict)  # time, gap, rate, rounding of the gap where one has just opened
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
@@ -38,6 +38,7 @@ class UnitModes:
     lifted: list = field(default_factory=list)  # opened to flights below rounding of the gap, which end at the top
     rising: dict = field(default_factory=dict)  # time and acceleration where a contact has begun to slide
     spread: dict = field(default_factory=dict)  # of contacts whose reactions are shared, see `ContactState.spread`
+    dependent: list = field(default_factory=list)  # closed ones whose rows depend on others, see shared_loads.py
 
     def sticks(self, i):
         """Whether a contact with friction sticks."""

@@ -246,8 +246,9 @@ class Transitions:
     def _take_contacts(self, contacts, before):
         """Take over a `ContactState`."""
         self.remembered, modes = self.remembered.copy(), self.modes
-        modes.closed, modes.idle, modes.slack = contacts.closed, contacts.idle, dict(contacts.slack)
-        modes.spread = dict(contacts.spread)
+        modes.closed, modes.slack = sorted([*contacts.closed, *contacts.dependent]), dict(contacts.slack)
+        modes.idle = [i for i in contacts.idle if i not in contacts.dependent]
+        modes.spread, modes.dependent = dict(contacts.spread), list(contacts.dependent)
         modes.rising = {i: (self.t, gain) for i, gain in contacts.begun.items()}
         modes.grips = gripped(self.gaps, before, contacts, self.q, self.remembered[self.count :])
 
@@ -443,7 +444,9 @@ class Transitions:
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
         unit = self.frictions.units[i]
         hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
-        phase = self._scene_of([self.gaps.list[k].side.gap for k in self.modes.closed], [hold])
+        phase = self._scene_of(
+            [self.gaps.list[k].side.gap for k in self.modes.closed if k not in self.modes.dependent], [hold]
+        )
         memory = self.remembered[self.count :].copy()
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]

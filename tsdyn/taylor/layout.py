@@ -18,7 +18,7 @@ from ..formulations.locked_orientations import instances
 from ..jit.kernels import Record, loader, records, twin
 from ..jit.resident import zeros
 from ..model.equations import changes_with_state
-from ..model.packed import System, coupled_loads, members_of
+from ..model.packed import System, coupled_loads, members_of, parts_read
 from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.program import run_program
@@ -342,7 +342,7 @@ def lay_out_frictions(packed, graph, places, forces, orders):
         body = force.a if on_a else force.b
         point = kind.reals + kind.stride * row.index + (0 if on_a else 6)
         slope = address(force.kernels, "load_slope", force.name, InvalidForce)
-        for part in packed.constraints[members[id(force.joint)].parts]:
+        for part in parts_read(packed, members, force):
             sources += _sources(part, body, index[id(body)], *where[id(part)], orders)
         frictions.append(
             [slope, scratch + (force.slots + size + REACTION) * orders, point, first, len(sources) - first]

@@ -6,8 +6,8 @@
 The normal loads N follow from reactions and these from the friction (`observables.evaluate.balance`). Of those that are
 at rest, which stick is found by pivoting: those beyond their bounds slide against what held them, those that would
 slide backwards stick. What several hold they share (friction_shares.py). Where directions turn, or pivoting goes round,
-all are one problem with cones, for given normal loads. Reactions of contacts at rest are found with each choice, as a problem with cones
-(contact_friction.py); what contacts hold by themselves needs no friction.
+all are one problem with cones, for given normal loads. Reactions of contacts at rest are found with each choice, as a
+problem with cones, too (contact_friction.py); what contacts hold by themselves needs no friction.
 """
 
 from __future__ import annotations

@@ -511,7 +511,7 @@ class _ContactRun(Transitions, Checkpoints):
             starting = {i: 2.0 * STOPPED * paces[i] for i in idle}
         else:
             rates = frictions.sizes(self.q, self.qdd, self.length)
-        slowing = Slowing(frictions, modes.begun, starting, rates).over
+        slowing = Slowing(frictions, modes.begun, starting, rates, modes.turning).over
         for i in range(frictions.count):
             if i in modes.blocked and i not in starting:
                 continue

@@ -28,6 +28,7 @@ class UnitModes:
     opened: dict = field(default_factory=dict)  # time, gap, rate, rounding of the gap where one has just opened
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
+    turning: dict = field(default_factory=dict)  # frictions that begin to slide: m/s, up to which they keep directions
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
     sharing: dict = field(default_factory=dict)  # those at rest that share a load: how many rows hold each, or could
     limits: dict = field(default_factory=dict)  # loads that count as none: of frictions that stick, and that have none

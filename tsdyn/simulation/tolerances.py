@@ -91,6 +91,9 @@ TURNED, FASTER = 1e-7, 4.0
 # event function is at least in the step in which it becomes fast: any above its rounding.
 BEGINS, KEPT = 0.49, 0.1
 
+# Of the velocity up to which friction keeps the direction of a slip that begins: what it turns by below is no event.
+TURNS = 0.1
+
 # Load of a friction over that up to which it counts as none, from which on it counts.
 LOADED = 4.0
 # Of the load that counts as none: rounding of reactions, along chains too.

@@ -10,6 +10,7 @@ from ..analyses.friction_problem import NoRest, RestProblem, free_motions, gradi
 from ..analyses.frictions import Hold
 from ..analyses.tolerances import EVENT_ERROR, KEPT_WAY, LEVEL, PIVOTS, RESTS, STOPPED
 from ..elements.bodies import largest_of_kind
+from ..elements.tolerances import SLIP
 from ..errors import (
     SingularConfiguration,
     Status,
@@ -327,7 +328,7 @@ class Transitions:
         place = frictions.at(self.q, paces, self.length)
         least = np.maximum(NEGLIGIBLE * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
         least = np.maximum(least, EVENT_ERROR * np.minimum(sizes, (self.t - self.span[0]) * rates))
-        self.remembered, resting, guess, turned = self.remembered.copy(), [], {}, {}
+        self.remembered, resting, guess, turned, turning = self.remembered.copy(), [], {}, {}, {}
         memory = self.remembered[count:]  # a part of it
         self.modes.blocked = self.off
         self.modes.limits = {i: x for i, x in before.limits.items() if i not in (*fired, *before.sticking)}
@@ -348,6 +349,9 @@ class Transitions:
                 memory[unit.way] = 0.0
             else:
                 memory[unit.way] = place.written(i, v[0, i] / speed)
+                if speed < before.turning.get(i, 0.0):
+                    turning[i] = before.turning[i]
+        self._keep_ways(turning)
         if not resting and cones is None:
             return None
         try:
@@ -357,7 +361,8 @@ class Transitions:
             self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         for i, way in rest.ways.items():
-            memory[frictions.units[i].way] = place.written(i, way) * (KEPT_WAY if i in rest.turning else 1.0)
+            memory[frictions.units[i].way] = place.written(i, way)
+        self._keep_ways({i: KEPT_WAY * SLIP * paces[i] for i in rest.turning})
         self.modes.sticking = {i: rest.partial.get(i, (ranks[i],))[0] for i in rest.sticking}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
         self.modes.begun, self.modes.limits = (
@@ -368,6 +373,12 @@ class Transitions:
         if cones is not None:
             self.friction = self._load(packed, rest.loads)
         return None
+
+    def _keep_ways(self, turning):
+        """Have frictions keep the directions of slips that begin, by units, up to these velocities."""
+        self.modes.turning |= turning
+        for i in turning:
+            self.remembered[self.count :][self.frictions.units[i].way] *= KEPT_WAY
 
     def _slip_terms_of_frictions(self):
         """Terms of the slips of frictions, those of their accelerations before, and their `paces`, (units,) each."""

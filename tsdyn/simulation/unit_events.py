@@ -15,7 +15,7 @@ from ..model.equations import recall
 from ..model.laws import calls_laws
 from ..runs.group_search import VALUES, KernelFunctions
 from ..workspaces import load_parts
-from .tolerances import LOADED, REACTION_NOISE
+from .tolerances import LOADED, REACTION_NOISE, TURNS
 
 
 class Closing:
@@ -243,6 +243,9 @@ class Slowing(KernelFunctions):
         Of those that are held without a force: the velocity that counts, by their numbers.
     rates : ndarray (frictions,)
         Sizes of the terms of accelerations.
+    turning : dict
+        Of those that begin to slide in a plane: the velocity up to which friction keeps its direction, by their
+        numbers. What the slip turns by below a part of it is no event.
 
     Attributes
     ----------
@@ -250,12 +253,14 @@ class Slowing(KernelFunctions):
         Rounding of the values, of slides that begin with an acceleration that is hardly more.
     """
 
-    def __init__(self, frictions, begun, starting, rates):
+    def __init__(self, frictions, begun, starting, rates, turning):
         count, packed = frictions.count, frictions.packed
         self.noise, starts = np.zeros(count), np.tile([[np.inf], [0.0], [np.inf]], count)
         for i, (t, first) in begun.items():
             self.noise[i] = LEVEL * rates[i] if first < LEVEL / REACTION_NOISE * rates[i] else 0.0
             starts[:2, i] = t, first
+        for i, most in turning.items():
+            self.noise[i] = TURNS * most
         starts[2, list(starting)] = list(starting.values())
         memory, sizes = np.zeros(packed.system.memory.size), np.array([packed.system.bodies[:, 1].sum(), count], int)
         ways, signed = np.ascontiguousarray(frictions.ways).ravel(), frictions.signed.astype(int)

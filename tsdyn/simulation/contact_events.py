@@ -254,6 +254,8 @@ def find_unit_slips(contacts, own, t, state, out, t0, before, near):  # eight: V
             h = turned / (turned + (TURNED * v) * (TURNED * v) + x.rounding[i] * x.rounding[i] + TINY)
         c = 0.5 + h * V / (v + V)  # from 1 on a slip has turned too far
         value = along - c * across / math.sqrt(max(1.0 - c * c, TURNED * TURNED))
+        if x.since[i] == math.inf:
+            value = min(along, value + least)
         if x.since[i] == math.inf and v > FASTER * V:
             value = max(value, KEPT * v)
         begun, gain = x.begun[0, i], x.begun[1, i]
@@ -268,13 +270,15 @@ class Halting(KernelFunctions):
 
         u = d.v,  z = |v - u d|,  c = 1/2 + w h,  w = V / (|v| + V),  h = z^2 / (z^2 + (TURNED |v|)^2 + noise^2)
 
-    Of a slip that ends without turning that is as smooth as v. Here d is of unit length, and V is SLOW times the slip
-    below which friction has this direction. A slip turns by 60 degrees at v >> V; where it has turned at all when it is
-    as slow as V, it takes its direction there, so that it ends with its own. One that hasn't been FASTER V at the start
-    of a step since its phase began has h = BEGINS, and turns by 8 degrees at v << V: it begins, or has its direction
-    from there. Where it begins at rest, the value is divided by the time since: the slip may turn at once. In the step
-    in which it becomes faster the value is KEPT |v| at least: one that has turned too far before its value was above
-    zero, as in a long step from rest, takes its direction where the next step begins.
+    Of a slip that ends without turning that is as smooth as v. Here d is of unit length, and V is SLOW times D, the
+    slip below which friction has this direction. A slip turns by 60 degrees at v >> V; where it has turned at all when
+    it is as slow as V, it takes its direction there, so that it ends with its own. One that hasn't been FASTER V at the
+    start of a step since its phase began has h = BEGINS, and turns by 8 degrees at v << V: it begins, or has its
+    direction from there. What friction that follows a load leaves such a slip across d is less than D, and no turn: of
+    u and the value plus D the lesser one counts. Where it begins at rest, the value is divided by the time since: the
+    slip may turn at once. In the step in which it becomes faster the value is KEPT |v| at least: one that has turned
+    too far before its value was above zero, as in a long step from rest, takes its direction where the next step
+    begins.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ import numpy as np
 from ..analyses.contact_rows import GapCounts, OpenGaps, find_open_gaps, measure_opened, reaction_workspace, write_lam
 from ..analyses.friction_units import INTS, slip_velocity, within
 from ..analyses.tolerances import LEVEL
+from ..elements.tolerances import SLIP
 from ..jit.kernels import callback, loader, matrix, resident, stack, vector
 from ..maths.tolerances import TINY
 from ..model.equations import recall
@@ -197,6 +198,7 @@ def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
         values[u] = within(v, d, x.signed[u] != 0)
         begun, first, counts = x.begun[0, u], x.begun[1, u], x.begun[2, u]
         if begun < math.inf:
+            values[u] = min(within(v, d, True), values[u] + SLIP * size)
             values[u] = values[u] / (t - begun) if t > begun else first
         if counts < math.inf:
             values[u] = counts - math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
@@ -206,9 +208,10 @@ def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
 class Slowing(KernelFunctions):
     """The velocities of frictions, along the directions in which they slide, as event functions.
 
-    In a plane a new direction is taken where it has turned by 60 degrees: `within`. The velocity of
-    one that has just begun to slide is divided by the time since. Of one that is held without a force, what its
-    velocity lacks of one that counts: a motor may begin to move it.
+    In a plane a new direction is taken where it has turned by 60 degrees: `within`. The velocity of one that has just
+    begun to slide is divided by the time since, and a slow one across the direction is no turn: by it friction follows
+    a load that turns. Of one that is held without a force, what its velocity lacks of one that counts: a motor may
+    begin to move it.
 
     Parameters
     ----------

@@ -197,7 +197,7 @@ class SlipParts(NamedTuple):
     drift: np.ndarray  # (m,)
     rounding: np.ndarray  # (c,)
     since: np.ndarray  # (c,)  when slips have become fast, s; infinite before
-    begun: np.ndarray  # (2, c)  time and acceleration of those that begin at rest; without acceleration others
+    begun: np.ndarray  # (2, c)  time and acceleration, if any, of those that begin at rest; infinite times of others
 
 
 load_slips = loader(
@@ -254,7 +254,7 @@ def find_unit_slips(contacts, own, t, state, out, t0, before, near):  # eight: V
             h = turned / (turned + (TURNED * v) * (TURNED * v) + x.rounding[i] * x.rounding[i] + TINY)
         c = 0.5 + h * V / (v + V)  # from 1 on a slip has turned too far
         value = along - c * across / math.sqrt(max(1.0 - c * c, TURNED * TURNED))
-        if x.since[i] == math.inf:
+        if x.since[i] == math.inf and x.begun[0, i] < math.inf:
             value = min(along, value + least)
         if x.since[i] == math.inf and v > FASTER * V:
             value = max(value, KEPT * v)
@@ -302,10 +302,10 @@ class Halting(KernelFunctions):
         workspace, (rows, at, sign) = gaps.workspace, gaps.slips(slides)
         self._workspace = workspace  # kept as long as addresses of it are in use
         self.slides, self.since = slides, np.array([fast.get(i, np.inf) for i in slides], float)
-        self.noise = np.where([i in begun for i in slides], 0.0, rounding)
+        self.noise = np.where([begun.get(i, (0.0, 0.0))[1] > 0.0 for i in slides], 0.0, rounding)
         place, memory = np.full(workspace.m, -1), np.zeros(gaps.packed.system.memory.size)
         place[rows.ravel()] = np.arange(rows.size)
-        starts = np.array([begun.get(i, (0.0, 0.0)) for i in slides], float).reshape(-1, 2).T
+        starts = np.array([begun.get(i, (np.inf, 0.0)) for i in slides], float).reshape(-1, 2).T
         own, *self._keep = resident(
             SlipParts(
                 SlipNumbers(n=workspace.n), memory, gaps.slots[slides], at, sign, place, workspace.short,

@@ -246,8 +246,8 @@ class Transitions:
         self.remembered, modes = self.remembered.copy(), self.modes
         modes.closed, modes.idle, modes.slack = contacts.closed, contacts.idle, dict(contacts.slack)
         modes.spread = dict(contacts.spread)
-        begun = [i for i, way in contacts.grips.items() if way is not None and i in before.closed and not before.slides(i)]
-        modes.rising = {i: (self.t, contacts.begun.get(i, 0.0)) for i in {**dict.fromkeys(begun), **contacts.begun}}
+        stuck = {i for i in before.closed if not before.slides(i) and contacts.grips.get(i) is not None}
+        modes.rising = {i: (self.t, contacts.begun.get(i, 0.0)) for i in sorted(stuck | contacts.begun.keys())}
         modes.grips = gripped(self.gaps, before, contacts, self.q, self.remembered[self.count :])
 
     def _begin_memory(self, closed):

@@ -54,6 +54,22 @@ def test_each_block_on_a_belt_has_the_period_of_one_alone(packs):
     assert len(packs) <= 4  # the whole scene's gaps, with open contacts, and with all rows that hold frictions
 
 
+def test_a_level_chain_of_twenty_rough_pins_is_let_go():
+    """M alpha = Q, up to friction of 1e-6: squares of relative accelerations far out are zero in floating point."""
+    scene, count, length, inertia = ts.Scene(gravity=(0, 0, -G)), 20, 0.2, 0.01
+    before = scene.ground
+    for i in range(count):
+        link = scene.add_body(1.0, 3 * [inertia], position=(length * (i + 0.5), 0, 0), name=f"link {i}")
+        pin = scene.add(C.Revolute.at(before, link, point=(length * i, 0, 0), axis=(0, 1, 0)))
+        scene.add(F.RevoluteFriction(pin, radius=0.01, kinetic=1e-6))
+        before = link
+    arms = length * (np.tri(count, k=-1) + 0.5 * np.eye(count))
+    alpha = np.linalg.solve(arms.T @ arms + inertia * np.eye(count), arms.T @ np.full(count, G))
+    solution = ts.simulate(scene, (0, 0.01))
+    found = [solution.angular_acceleration(f"link {i}")[0][1] for i in range(count)]
+    np.testing.assert_allclose(found, alpha, atol=1e-5)
+
+
 @pytest.mark.slow
 def test_a_chain_of_rough_pins(packs):
     """What sticks doesn't turn, all else does, and friction takes what energy is lost."""

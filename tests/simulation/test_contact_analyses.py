@@ -4,6 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tests.helpers.resuming import Stop
@@ -147,6 +148,32 @@ def test_redundant_contacts_of_a_box():
     forces = np.array([found.reaction(f"corner {i}")[0][2] for i in range(4)])
     np.testing.assert_allclose([forces.sum(), forces[1] + forces[3]], [1.5 * G, 0.5 * G], rtol=1e-12)
     assert ts.simulate(scene, (0, 1), state=found.state).phases[0][1] == 1.0
+
+
+@pytest.mark.parametrize("tilt", [(0.0, 0.0, 0.0), (0.02, -0.08, 0.05), (0.2, 0.14, -0.1), (-0.2, -0.3, 0.1)], ids=str)
+def test_a_box_on_a_soft_spring_comes_down_on_its_lower_face(tilt):
+    """Not turned over about the corner that lands first: no corner passes through the floor on the way down."""
+    scene = box()
+    scene["box"].position, scene["box"].orientation = (0, 0, 0.6), Rotation.from_rotvec(tilt).as_matrix()
+    scene.add(ts.forces.Spring(scene["box"], scene.ground, point_b=(0, 0, 1.5), stiffness=5.0, free_length=0.5))
+    found = scene.equilibrium()
+    np.testing.assert_allclose(found.state.position("box"), [0, 0, 0.2], atol=1e-12)
+    np.testing.assert_allclose(found.state.rotation("box")[2], [0, 0, 1], atol=1e-12)
+    forces = np.array([found.reaction(f"corner {i}")[0][2] for i in range(8)])
+    np.testing.assert_allclose([forces.sum(), forces[:4].sum()], 2 * G - 5.0 * 0.8, rtol=1e-12)
+
+
+def test_a_ball_comes_to_rest_in_a_groove():
+    """No force but the weight: the way down meets one side, then the other one."""
+    scene, sides = ts.Scene(gravity=(0, 0, -G)), np.array([0.4, -0.7])
+    ball = scene.add_body(**ts.shapes.sphere(0.1, mass=1.0), position=(0.2, 0, 0.3), name="ball")
+    scene.add(C.Dot2(scene.ground, ball, axis_a=(0, 1, 0)))
+    normals = np.column_stack([np.sin(sides), 0 * sides, np.cos(sides)])
+    for i in range(2):
+        scene.add(C.SphereContact(ball, scene.ground, radius_a=0.1, normal_b=normals[i], name=f"side {i}"))
+    found = scene.equilibrium()
+    forces = [found.reaction(f"side {i}")[0] @ normals[i] for i in range(2)]
+    np.testing.assert_allclose(forces @ normals, [0, 0, G], atol=1e-12)
 
 
 # motions

@@ -61,6 +61,34 @@ def test_coins_that_begin_to_slip_across_their_load(seed, most):
     assert not [found for law in (laws.rubbing, laws.unilateral) for found in law(solution) if found.broken]
 
 
+@pytest.mark.parametrize("unilateral", [False, True], ids=["bilateral", "unilateral"])
+@pytest.mark.parametrize(("growth", "turn"), [(0.2, 0.4), (0.2, 4.0), (0.01, 1.0)])
+def test_a_block_breaks_away_under_a_load_that_turns(growth, turn, unilateral):
+    """The load grows to mu m g at 1 s, and turns faster than it grows: m v' = L - mu m g v / |v|, v = 0 there."""
+    scene, mu, t = ts.Scene(gravity=(0, 0, -G)), 0.3, ts.motions.time
+    block = scene.add_point_mass(1.0, name="block")
+    given = {"unilateral": True, "kinetic": mu} if unilateral else {}
+    floor = scene.add(C.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), **given, name="rub"))
+    if not unilateral:
+        floor.name = "floor"
+        scene.add(ts.forces.ContactFriction(floor, kinetic=mu, name="rub"))
+    size = mu * G * (1.0 + growth * (t - 1.0))
+    scene.add(ts.forces.PointForce(block, force=(size * np.cos(turn * t), size * np.sin(turn * t), 0.0)))
+    solution = ts.simulate(scene, (0, 1.5), rtol=1e-10, atol=1e-12)
+
+    def rates(t, y):
+        load = (1.0 + growth * (t - 1.0)) * np.array([np.cos(turn * t), np.sin(turn * t)])
+        return np.append(y[2:], mu * G * (load - y[2:] / np.hypot(*y[2:])))
+
+    begin = 1e-5  # s, up to which the slip is along the load
+    way = np.array([np.cos(turn * (1.0 + begin)), np.sin(turn * (1.0 + begin))])
+    start = np.append([0.0, 0.0], 0.5 * mu * G * growth * begin**2 * way)
+    exact = solve_ivp(rates, (1.0 + begin, 1.5), start, method="Radau", rtol=1e-9, atol=1e-13).y[:2, -1]
+    assert [phase.sticking for phase in solution.phases] == [("rub",), ()]
+    assert abs(solution.phases[0].end - 1.0) * growth < 1e-15
+    np.testing.assert_allclose(solution.position("block")[-1, :2], exact, atol=1e-8)
+
+
 @pytest.mark.parametrize("method", [ts.integrators.Nystrom4(step=1e-5), "rk45"], ids=["nystrom4", "rk45"])
 def test_a_small_coin_keeps_its_gap(method):
     """Its radius is the only length of the scene: gaps are held to rounding of it, not of axes of length one."""

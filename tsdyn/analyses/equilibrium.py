@@ -136,6 +136,7 @@ class Descent(Moves):
     """A configuration at rest, moved step by step; arguments of `Moves`."""
 
     relative = False  # whether what has no positive stiffness may be stable all the same
+    watch = None  # called with the descent at its start and after each step; what it raises ends the way
 
     def __init__(self, *start):
         super().__init__(*start)
@@ -159,6 +160,8 @@ class Descent(Moves):
         ):
             before = self.unbalanced
             self.report_steps()
+            if self.watch is not None:
+                self.watch(self)
             if before <= SUM_ROUNDING or not self._step():
                 break
             self.steps += 1
@@ -422,10 +425,14 @@ class Equilibrium:
         return f"<Equilibrium{moving}: {kind}{neutral}, {which} {self.smallest_stiffness:.4g} 1/s^2>"
 
 
-def find_equilibrium(packed, handles, remembered, t, q, q0, report):
-    """The `Equilibrium` reached from a consistent q, q0 being where the search began; report(fraction, said)."""
+def find_equilibrium(packed, handles, remembered, t, q, q0, report, watch=None):
+    """The `Equilibrium` reached from a consistent q, q0 being where the search began; report(fraction, said).
+
+    watch: of the `Descent`.
+    """
     demand_continuous(packed)
     descent = Descent(packed, handles, remembered, t, q, report)
+    descent.watch = watch
     _demand_held(descent.frame)
     for _ in range(limits.MOST_SADDLES):
         if not descent.balance():

@@ -297,6 +297,7 @@ class RestProblem:
         blocked = [i for i in ways if not rates[i] and self._is_blocked(i, sticking, self.pressed)] + self.idle
         for i in self.light:
             along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
+            along = along / np.abs(along).max()  # whose square may be zero
             ways[i] = along @ self.bases[i] / np.linalg.norm(along)
         known = {*sticking, *self.light, *(unloaded - self.rows.keys())}
         # The slip of what begins without an acceleration is no more than time after time squared

@@ -189,10 +189,11 @@ def equilibrium(
     """
     with StageProgress(progress, "equilibrium") as report:
         report(0.0, "the start is checked")
-        return _equilibrium(scene, guess, t, spin, about, rotors, report)
+        return descend(scene, guess, t, spin, about, rotors, report)
 
 
-def _equilibrium(scene, guess, t, spin, about, rotors, report):
+def descend(scene, guess, t, spin, about, rotors, report, watch=None):
+    """The `Equilibrium`; watch is that of the `Descent`."""
     from ..analyses.equilibrium import (  # imported here: a run needs none of it
         demand_admitted,
         find_equilibrium,
@@ -228,7 +229,9 @@ def _equilibrium(scene, guess, t, spin, about, rotors, report):
     memory = remembered(state, kept, float(t), q)
     q, _ = kept.start(scene, (q, qd), float(t), INITIAL_TOL, memory, True)
     arguments = kept.packed, kept.handles, memory, float(t), q.copy(), given
-    return find_equilibrium(*arguments, report) if field is None else find_relative(*arguments, field, report)
+    if field is None:
+        return find_equilibrium(*arguments, report, watch)
+    return find_relative(*arguments, field, report)
 
 
 def _positions(packed, guess, n):

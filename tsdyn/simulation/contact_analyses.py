@@ -15,11 +15,13 @@ from ..observables import reactions
 from ..observables.state import RememberingState, State, StatePhase, remembered
 from ..runs.task import state_arrays
 from ..validation import finite_vector, listed, number
+from .analyses import descend
 from .contact_run import begun, demand_apart
 from .grips import add_friction
 from .phase_scenes import NAMED, at_start, dependent, gaps_of, inactive_of, named, phase_of
 from .phases import UnitModes, shared_rows
 from .scene_cache import prepared
+from .termination import StageProgress
 
 # What happens at a state is decided as a run from it does: contacts that are closed, at rest and push hold, the others
 # are open.
@@ -81,60 +83,91 @@ def set_start(scene, own, state=None, **keywords):
     scene.touch()
 
 
-def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
+class _Met(Exception):
+    """Where the way to an equilibrium meets open contacts: the state there, and their gaps."""
+
+    def __init__(self, state, gaps):
+        super().__init__(gaps)
+        self.state, self.gaps = state, gaps
+
+
+class _Way:
+    """Watches a descent with the open contacts: raises `_Met` before it goes on through them."""
+
+    def __init__(self, gaps, closed):
+        self.gaps, self.closed, self.before = gaps, closed, None
+
+    def __call__(self, descent):
+        q, angles = descent.rest.q, descent.angles
+        values = self.gaps.at(q, angles)
+        values[self.closed] = np.inf
+        deep = np.flatnonzero(values < -INITIAL_TOL * (1.0 + np.abs(q).max()))
+        if deep.size:
+            shares = np.zeros(deep.size)  # of the step
+            if self.before is not None:
+                last, apart = self.before
+                shares = np.clip(apart[deep] / (apart[deep] - values[deep]), 0.0, 1.0)
+                q = descent.rest.closed(last + shares.min() * (q - last))
+                q = last if q is None else q
+            t, none = descent.t, np.zeros_like(q)
+            state = RememberingState.of(descent.packed, descent.memory, Anchor(angles), t, q, none, none, none[:0])
+            raise _Met(state, deep[shares <= shares.min() + INITIAL_TOL].tolist())
+        self.before = q, values
+
+
+def equilibrium(scene, own, guess=None, t=0.0, spin=None, about=(0.0, 0.0, 0.0), rotors=None, *, progress=None):
     """The `Equilibrium` with closed contacts that push and open ones that don't penetrate.
 
     Where frictions hold all that they act on, that which they hold; else without friction, from the contacts that are
-    closed at the guess on: of those that the way to the equilibrium meets the first one is closed, and those that would
-    have to pull are opened.
+    closed at the guess on: those that the way to the equilibrium meets are closed there, and those that would have to
+    pull are opened.
     """
     gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     frictions = [force for force in scene._forces if getattr(force, "slides", ())]
     if frictions or gaps.rough.any():
-        _demand_still(frictions, gaps, *arguments, **keywords)
-        found = _held(scene, own, guess, t, *arguments, **keywords)
+        _demand_still(frictions, gaps, spin, rotors)
+        found = _held(scene, own, guess, t, spin, about, rotors, progress=progress)
         if found is not None:
             return found
     without = dependent(scene, (*inactive_of(scene), *frictions))
     q = scene.start[0] if guess is None else np.asarray(getattr(guess, "q", guess), float)
     closed, seen = closed_gaps(gaps, q, _angles(kept, guess, t, q)), set()
-    while frozenset(closed) not in seen:
-        seen.add(frozenset(closed))
-        phase = phase_of(scene, [gaps.list[i].side.gap for i in closed], without=without)
-        try:
-            found = own(phase, guess, t, *arguments, **keywords)
-        except NoEquilibrium as error:
-            others = [gaps.names[i] for i in range(gaps.count) if i not in closed]
-            raise NoEquilibrium(
-                f"{error} Open contacts carry no load: {listed(list(dict.fromkeys(others)), NAMED)}. Start where "
-                "those that are needed are closed, such as from the state of a run that has come to rest."
-                if others
-                else str(error)
-            ) from None
-        state = found.state
-        values, before = gaps.at(state.q, state.angles), gaps.at(q, _angles(kept, guess, t, q))
-        deep = np.flatnonzero(values < -INITIAL_TOL * (1.0 + np.abs(state.q).max()))
-        if deep.size:  # the first that the way meets
-            met = deep[np.argmin(before[deep] / (before[deep] - values[deep]))]
-            closed = sorted([*closed, int(met)])
-            continue
-        inertia = Inertia(gaps, float(t), state.q, state.memory, closed)
-        try:
-            contacts = solve_contacts(inertia, closed, state.qd)
-        except NoSolution:
-            break
-        pushing = sorted([*contacts.closed, *contacts.idle])
-        if pushing == closed:
-            phase = phase_of(scene, [gaps.list[i].side.gap for i in contacts.closed], without=without)
-            return _of_all(scene, found, gaps, phase, UnitModes(contacts.closed))
-        guess, q, closed = state, state.q, pushing
+    with StageProgress(progress, "equilibrium") as report:
+        while frozenset(closed) not in seen:
+            phase = phase_of(scene, [gaps.list[i].side.gap for i in closed], without=without)
+            try:
+                found = descend(phase, guess, t, spin, about, rotors, report, _Way(gaps, closed))
+            except _Met as met:
+                closed, guess = sorted({*closed, *met.gaps}), met.state
+                continue
+            except NoEquilibrium as error:
+                others = [gaps.names[i] for i in range(gaps.count) if i not in closed]
+                raise NoEquilibrium(
+                    f"{error} Open contacts carry no load: {listed(list(dict.fromkeys(others)), NAMED)}. Start where "
+                    "those that are needed are closed, such as from the state of a run that has come to rest."
+                    if others
+                    else str(error)
+                ) from None
+            seen.add(frozenset(closed))
+            state = found.state
+            inertia = Inertia(gaps, float(t), state.q, state.memory, closed)
+            try:
+                contacts = solve_contacts(inertia, closed, state.qd)
+            except NoSolution:
+                break
+            pushing = sorted([*contacts.closed, *contacts.idle])
+            if pushing == closed:
+                phase = phase_of(scene, [gaps.list[i].side.gap for i in contacts.closed], without=without)
+                found.moved = float(np.abs(state.q - q).max())
+                return _of_all(scene, found, gaps, phase, UnitModes(contacts.closed))
+            guess, closed = state, pushing
     raise NoEquilibrium(
         "no set of closed contacts was found that push while the others stay open. Start nearer to the equilibrium, "
         "with guess=, such as from the state of a run that has come to rest."
     )
 
 
-def _demand_still(frictions, gaps, spin=None, about=None, rotors=None, **_):
+def _demand_still(frictions, gaps, spin, rotors):
     """Refuse friction of the exact law in steady motion."""
     if spin is not None or rotors is not None:
         items = [*frictions, *(gaps.list[i].contact for i in np.flatnonzero(gaps.rough))]

@@ -221,7 +221,7 @@ class SlipParts(NamedTuple):
     drift: np.ndarray  # (m,)
     rounding: np.ndarray  # (c,)
     since: np.ndarray  # (c,)  when slips have become fast, s; infinite before
-    begun: np.ndarray  # (2, c)  time and acceleration of those that begin at rest; without acceleration others
+    begun: np.ndarray  # (2, c)  time and acceleration, if any, of those that begin at rest; infinite times of others
 
 
 load_slips = loader(
@@ -278,6 +278,8 @@ def find_unit_slips(contacts, own, t, state, out, t0, before, near):  # eight: V
             h = turned / (turned + (TURNED * v) * (TURNED * v) + x.rounding[i] * x.rounding[i] + TINY)
         c = 0.5 + h * V / (v + V)  # from 1 on a slip has turned too far
         value = along - c * across / math.sqrt(max(1.0 - c * c, TURNED * TURNED))
+        if x.since[i] == math.inf and x.begun[0, i] < math.inf:
+            value = min(along, value + least)
         if x.since[i] == math.inf and v > FASTER * V:
             value = max(value, KEPT * v)
         begun, gain = x.begun[0, i], x.begun[1, i]
@@ -292,13 +294,15 @@ class Halting(KernelFunctions):
 
         u = d.v,  z = |v - u d|,  c = 1/2 + w h,  w = V / (|v| + V),  h = z^2 / (z^2 + (TURNED |v|)^2 + noise^2)
 
-    Of a slip that ends without turning that is as smooth as v. Here d is of unit length, and V is SLOW times the slip
-    below which friction has this direction. A slip turns by 60 degrees at v >> V; where it has turned at all when it is
-    as slow as V, it takes its direction there, so that it ends with its own. One that hasn't been FASTER V at the start
-    of a step since its phase began has h = BEGINS, and turns by 8 degrees at v << V: it begins, or has its direction
-    from there. Where it begins at rest, the value is divided by the time since: the slip may turn at once. In the step
-    in which it becomes faster the value is KEPT |v| at least: one that has turned too far before its value was above
-    zero, as in a long step from rest, takes its direction where the next step begins.
+    Of a slip that ends without turning that is as smooth as v. Here d is of unit length, and V is SLOW times D, the
+    slip below which friction has this direction. A slip turns by 60 degrees at v >> V; where it has turned at all when
+    it is as slow as V, it takes its direction there, so that it ends with its own. One that hasn't been FASTER V at the
+    start of a step since its phase began has h = BEGINS, and turns by 8 degrees at v << V: it begins, or has its
+    direction from there. What friction that follows a load leaves such a slip across d is less than D, and no turn: of
+    u and the value plus D the lesser one counts. Where it begins at rest, the value is divided by the time since: the
+    slip may turn at once. In the step in which it becomes faster the value is KEPT |v| at least: one that has turned
+    too far before its value was above zero, as in a long step from rest, takes its direction where the next step
+    begins.
 
     Parameters
     ----------
@@ -322,10 +326,10 @@ class Halting(KernelFunctions):
         workspace, (rows, at, sign) = gaps.workspace, gaps.slips(slides)
         self._workspace = workspace  # kept as long as addresses of it are in use
         self.slides, self.since = slides, np.array([fast.get(i, np.inf) for i in slides], float)
-        self.noise = np.where([i in begun for i in slides], 0.0, rounding)
+        self.noise = np.where([begun.get(i, (0.0, 0.0))[1] > 0.0 for i in slides], 0.0, rounding)
         place, memory = np.full(workspace.m, -1), np.zeros(gaps.packed.system.memory.size)
         place[rows.ravel()] = np.arange(rows.size)
-        starts = np.array([begun.get(i, (0.0, 0.0)) for i in slides], float).reshape(-1, 2).T
+        starts = np.array([begun.get(i, (np.inf, 0.0)) for i in slides], float).reshape(-1, 2).T
         own, *self._keep = resident(
             SlipParts(
                 SlipNumbers(n=workspace.n), memory, gaps.slots[slides], at, sign, place, workspace.short,

@@ -250,7 +250,8 @@ class Transitions:
         modes.closed, modes.slack = sorted([*contacts.closed, *contacts.dependent]), dict(contacts.slack)
         modes.idle = [i for i in contacts.idle if i not in contacts.dependent]
         modes.spread, modes.dependent = dict(contacts.spread), list(contacts.dependent)
-        modes.rising = {i: (self.t, gain) for i, gain in contacts.begun.items()}
+        stuck = {i for i in before.closed if not before.slides(i) and contacts.grips.get(i) is not None}
+        modes.rising = {i: (self.t, contacts.begun.get(i, 0.0)) for i in sorted(stuck | contacts.begun.keys())}
         modes.grips = gripped(self.gaps, before, contacts, self.q, self.remembered[self.count :])
 
     def _begin_memory(self, closed):

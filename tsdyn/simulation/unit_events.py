@@ -194,11 +194,11 @@ class SlowingParts(NamedTuple):
     axes: np.ndarray
     ways: np.ndarray  # int64 (3 units,)  where the memory has directions
     signed: np.ndarray  # int64 (units,)  1 of those along an axis, whose direction is a sign
-    begun: np.ndarray  # (3, units)  time and acceleration of those that have just begun to slide; as of `starting`
+    begun: np.ndarray  # (4, units)  time and acceleration of those that have just begun; as of `starting`, of `turning`
     sizes: np.ndarray  # (2,)  numbers of coordinates and units
 
 
-load_slowing = loader(SlowingParts(_none, _whole, _none, _none, _whole, _whole, np.zeros((3, 0)), _whole))
+load_slowing = loader(SlowingParts(_none, _whole, _none, _none, _whole, _whole, np.zeros((4, 0)), _whole))
 
 
 @callback(VALUES)
@@ -219,7 +219,9 @@ def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
         for i in range(3):
             d[i] = x.memory[x.ways[o]] * axis[i] if x.signed[u] != 0 else d[i] / size
         values[u] = within(v, d, x.signed[u] != 0)
-        begun, first, counts = x.begun[0, u], x.begun[1, u], x.begun[2, u]
+        begun, first, counts, kept = x.begun[0, u], x.begun[1, u], x.begun[2, u], x.begun[3, u]
+        if kept > 0.0:
+            values[u] = min(within(v, d, True), values[u] + kept)
         if begun < math.inf:
             values[u] = values[u] / (t - begun) if t > begun else first
         if counts < math.inf:
@@ -230,9 +232,10 @@ def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
 class Slowing(KernelFunctions):
     """The velocities of frictions, along the directions in which they slide, as event functions.
 
-    In a plane a new direction is taken where it has turned by 60 degrees: `within`. The velocity of
-    one that has just begun to slide is divided by the time since. Of one that is held without a force, what its
-    velocity lacks of one that counts: a motor may begin to move it.
+    In a plane a new direction is taken where it has turned by 60 degrees: `within`. The velocity of one that has just
+    begun to slide is divided by the time since, and a slow one across the direction is no turn: by it friction follows
+    a load that turns. Of one that is held without a force, what its velocity lacks of one that counts: a motor may
+    begin to move it.
 
     Parameters
     ----------
@@ -245,7 +248,7 @@ class Slowing(KernelFunctions):
         Sizes of the terms of accelerations.
     turning : dict
         Of those that begin to slide in a plane: the velocity up to which friction keeps its direction, by their
-        numbers. What the slip turns by below a part of it is no event.
+        numbers. Less across that direction is no turn; without an acceleration, a part of it back is no end.
 
     Attributes
     ----------
@@ -255,12 +258,12 @@ class Slowing(KernelFunctions):
 
     def __init__(self, frictions, begun, starting, rates, turning):
         count, packed = frictions.count, frictions.packed
-        self.noise, starts = np.zeros(count), np.tile([[np.inf], [0.0], [np.inf]], count)
+        self.noise, starts = np.zeros(count), np.tile([[np.inf], [0.0], [np.inf], [0.0]], count)
         for i, (t, first) in begun.items():
             self.noise[i] = LEVEL * rates[i] if first < LEVEL / REACTION_NOISE * rates[i] else 0.0
             starts[:2, i] = t, first
         for i, most in turning.items():
-            self.noise[i] = TURNS * most
+            self.noise[i], starts[3, i] = self.noise[i] if i in begun else TURNS * most, most
         starts[2, list(starting)] = list(starting.values())
         memory, sizes = np.zeros(packed.system.memory.size), np.array([packed.system.bodies[:, 1].sum(), count], int)
         ways, signed = np.ascontiguousarray(frictions.ways).ravel(), frictions.signed.astype(int)

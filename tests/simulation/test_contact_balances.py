@@ -174,3 +174,21 @@ def test_contacts_without_friction_have_no_power():
     (name,) = [each.name for each in scene.constraints if isinstance(each, C.Stop)]
     for values in (solution.power_of(name), solution.work_of(name), solution.dissipation):
         assert values.tolist() == [0.0] * solution.t.size
+
+
+def test_work_of_frictions_past_a_singular_configuration_adds_up():
+    """A parallelogram passes its flat configuration, next to which reactions of the single hinges are rounding."""
+    scene, P = ts.Scene(), np.array([(0, 0, 0), (0, 0, 1), (2, 0, 1), (2, 0, 0)])
+    bars = [scene.add_body(1.0, (0.1, 0.1, 0.1), position=(P[i] + P[j]) / 2) for i, j in ((0, 1), (1, 2), (3, 2))]
+    crank, coupler, rocker = bars
+    hinges = [scene.add(C.Revolute.at(scene.ground, crank, point=P[0], axis=(0, 1, 0), name="hinge"))]
+    for pair, point in (((crank, coupler), P[1]), ((coupler, rocker), P[2])):
+        scene.add(C.Spherical.at(*pair, point=point))
+    hinges.append(scene.add(C.Revolute.at(scene.ground, rocker, point=P[3], axis=(0, 1, 0))))
+    frictions = [scene.add(ts.forces.RevoluteFriction(hinge, radius=0.05, kinetic=0.2)) for hinge in hinges]
+    scene.set("hinge", rate=2.0)
+    solution = ts.simulate(scene, (0, 10), dense_output=True)
+    works = [solution.work_of(friction)[-1] for friction in frictions]
+    lost = solution.energy[-1] - solution.energy[0]
+    assert abs(sum(works) - lost) < 1e-7 * abs(lost)
+    assert abs(works[0] - works[1]) < 1e-6 * abs(lost)

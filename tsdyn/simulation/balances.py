@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from ..calls import fitting_methods
 from ..errors import InvalidArgument
@@ -102,43 +103,54 @@ def work(solution, trajectory, item=None):
     pieces = np.zeros(0)
     for first in range(0, edges.size - 1, AT_ONCE):
         some = edges[first : first + AT_ONCE + 1]
-        pieces = np.append(pieces, _integrals(power, some[:-1], some[1:], floor, 0))
+        pieces = np.append(pieces, _integrals(power, some[:-1], some[1:], floor)[0])
     done = np.append(0.0, np.cumsum(pieces))[np.searchsorted(edges, solution.t)]
     if item is None and solution._phases is not None:  # impacts
         done += solution._phases.gained()[solution._phase_of_rows]
     return done
 
 
-def _integrals(power, a, b, floor, depth, known=None):
+def _integrals(power, a, b, floor, depth=0, known=None):
     """Return the work from each a to its b, by bisection until halves agree, or to a floor, J: steps are long.
 
-    known: what `_quadrature` gives for them, if it has been asked already.
+    And by how much halves are off. Next to singular configurations, where those of halves are off by more, powers are
+    rounding: there the whole counts. known: what `_quadrature` gives for them, if it has been asked already.
     """
     done, size = known or _quadrature(power, a, b)
-    if depth == DEEPEST or not a.size:
-        return done
     middle, count = 0.5 * (a + b), a.size
     a, b = np.append(a, middle), np.append(middle, b)
     parts, sizes = _quadrature(power, a, b)
     found = parts[:count] + parts[count:]
-    off = np.flatnonzero(np.abs(found - done) > np.maximum(AGREE * size, floor))
-    both = np.append(off, off + count)
-    finer = _integrals(power, a[both], b[both], floor, depth + 1, (parts[both], sizes[both]))
-    found[off] = finer[: off.size] + finer[off.size :]
-    return found
+    error = np.abs(found - done)
+    off = np.flatnonzero(~(error <= np.maximum(AGREE * size, floor)))
+    if off.size and depth < DEEPEST:
+        both = np.append(off, off + count)
+        finer, left = _integrals(power, a[both], b[both], floor, depth + 1, (parts[both], sizes[both]))
+        finer, left = finer[: off.size] + finer[off.size :], left[: off.size] + left[off.size :]
+        better = ~(left > error[off])
+        found[off[better]], error[off[better]] = finer[better], left[better]
+    return found, error
 
 
 def _quadrature(power, a, b):
-    """Integrals (k,) of the power and of its size, five nodes each."""
+    """Integrals (k,) of the power and of its size, five nodes each.
+
+    Powers next to a singular configuration, where there is no state, are those of the polynomial through the others.
+    """
     middle, half = 0.5 * (b + a), 0.5 * (b - a)
     values = power((middle[:, None] + half[:, None] * NODES).ravel()).reshape(-1, NODES.size)
+    lost = np.isnan(values)
+    for k in np.flatnonzero(lost.any(axis=1) & ~lost.all(axis=1)):
+        there = NODES[~lost[k]], values[k, ~lost[k]]
+        values[k, lost[k]] = Polynomial.fit(*there, there[0].size - 1)(NODES[lost[k]])
     return half * (values @ WEIGHTS), half * (np.abs(values) @ WEIGHTS)
 
 
 def _power(solution, trajectory, item, t):
     states, memory, status = trajectory(t)
-    if status != 0:
-        return np.full(t.size, np.nan)
+    if status != 0:  # of one of them at least
+        halves = np.array_split(t, 2) if t.size > 1 else ()
+        return np.concatenate([_power(solution, trajectory, item, some) for some in halves] or [np.full(1, np.nan)])
     levels, power, phases = [np.ascontiguousarray(states[:, i]) for i in range(3)], np.zeros(t.size), solution._phases
     varies = phases is not None and phases.varies
     for packed, mine in phases.packed_at(t) if varies else [(solution.packed, slice(None))]:

@@ -57,7 +57,7 @@ BAR_AFTER = 1.0
 # Of the largest kinetic energy per second: power below it is rounding.
 NO_POWER = 1e-9
 # Of a piece's integral: its two halves agree with the whole; halvings at most.
-AGREE, DEEPEST = 1e-11, 8
+AGREE, DEEPEST = 1e-11, 7
 # Segments in a row that together get on by less than a part of the run: series carry the motion past nothing there.
 PASSES, GOT_ON = 16, 1e-9
 

@@ -3,7 +3,8 @@
 Numba optimises every function with all that it calls linked in, and makes machine code of it and of two wrappers, for
 Python and for C. Of a kernel that only kernels call all of that is lost: its callers link it in and do it again. Here
 such a kernel is lowered and left at that, operators are typed once for the same operands, and passes over the code that
-serve no kernel of tsdyn's are left out. Compiled kernels are stored under a hash of all code that they depend on.
+serve no kernel of tsdyn's are left out. Compiled kernels are stored under a hash of all code that they depend on, and
+so are those that kernels link in: what one process has lowered no other one lowers again.
 
 This file alone uses what isn't Numba's or llvmlite's public interface: SEEN lists it, `check` looks whether it is
 there. Where it isn't, or fails, stock.py takes its place (compilers.py).
@@ -37,7 +38,7 @@ from numba.extending import infer_getattr, lower_getattr_generic, models, regist
 
 from ..errors import CompilerWarning
 from . import cache as files
-from .code_hash import is_ours, versions
+from .code_hash import is_ours, types_hash, versions
 from .target import chosen as target
 from .target import portable
 
@@ -93,6 +94,7 @@ codegen.CPUCodeLibrary.__init__(self, codegen, name)
 codegen.CPUCodeLibrary.__init__:_linking_libraries
 codegen.CPUCodeLibrary.__init__:_final_module
 codegen.CPUCodeLibrary._get_module_for_linking(self)
+codegen.CPUCodeLibrary._get_module_for_linking:_shared_module
 codegen.CPUCodeLibrary._optimize_functions(self, ll_module)
 codegen.CPUCodeLibrary._optimize_functions:_data_layout
 codegen.CPUCodegen._function_pass_manager(self, kwargs)
@@ -119,6 +121,11 @@ ccallback.CFunc.__init__:_cache
 ccallback.CFunc.compile(self)
 caching._Cache.load_overload(self, sig, target_context)
 caching._Cache.save_overload(self, sig, data)
+funcdesc.FunctionDescriptor.__init__:typemap
+funcdesc.FunctionDescriptor.__init__:calltypes
+compiler.CompileResult._fields
+dispatcher.Dispatcher.compile:load_overload
+dispatcher.Dispatcher.compile:insert_user_function
 options.DefaultOptions._nrt
 compiler.Flags.no_cpython_wrapper
 compiler.Flags.no_cfunc_wrapper
@@ -138,6 +145,7 @@ _SERVE_OTHERS = {  # passes for closures, with blocks, exceptions, literal_unrol
     typed_passes.NopythonRewrites,
     typed_passes.DumpParforDiagnostics,
 }
+_DYNAMIC = "numba.dynamic.globals"  # how names of addresses of the process begin
 _OPTIONAL = "__array__", "static_getitem", "static_setitem"  # of which no type need have an implementation
 _of_ours = {}  # way of lowering: passes over tsdyn's own kernels
 
@@ -269,6 +277,12 @@ class Compiler(CompilerBase):
 class _Library(_Kernel):
     """The code of a kernel and of those that it calls, to be linked into others."""
 
+    def __init__(self, codegen, name, bitcode=None):
+        super().__init__(codegen, name)
+        if bitcode is not None:  # as it was stored
+            self._shared_module = self._final_module = llvm.parse_bitcode(bitcode)
+            self._finalized = True
+
     def finalize(self):
         """Link in what the kernel calls, and leave optimising to whoever links this in."""
         self._raise_if_finalized()
@@ -298,7 +312,65 @@ class _CalleeCompiler(Compiler):
     lowering = _CalleeLowering
 
 
+class _CalleeCache(_Cache):
+    """The disk cache of a kernel that kernels call: LLVM's code of it, which other processes link into theirs."""
+
+    def __init__(self, function, options):
+        self._function, self._options = function, sorted(options.items())
+
+    @property
+    def cache_path(self):
+        """The folder that kernels are written to."""
+        return str(files.folder())
+
+    def enable(self):
+        """Do nothing: kernels are always cached."""
+
+    disable = flush = enable
+
+    def _file(self, kinds):
+        key = files.key_of((types_hash(kinds), self._options), target())
+        return f"{files.name_of(self._function)}-{key}{files.CALLEE}"
+
+    def load_overload(self, sig, target_context):
+        """Return the kernel, or None."""
+        return files.load(self._file(sig), partial(_linkable, context=_for_target(target_context)))
+
+    def save_overload(self, sig, data):
+        """Store the kernel."""
+        library, fndesc = data.library, data.fndesc
+        if any(isinstance(kind, types.Callable) for kind in sig):  # a function of this process
+            return
+        bitcode = library._get_module_for_linking().as_bitcode()
+        if files.folder() is None or any(name.encode() in bitcode for name in (_DYNAMIC, RuntimeLinker.PREFIX)):
+            return
+        fndesc.typemap = fndesc.calltypes = None
+        try:
+            kept = library.name, tuple(library._reload_init), bitcode, fndesc, data.signature
+            files.save(self._file(sig), pickle.dumps(kept))
+        except OSError as error:
+            files.warn_unwritable(error)
+        except (AttributeError, TypeError, pickle.PicklingError):  # a type of this process alone
+            return
+
+
+def _linkable(payload, context):
+    """The kernel of a stored one."""
+    name, begin, bitcode, fndesc, signature = pickle.loads(payload)
+    for call in begin:
+        call()
+    library = _Library(context.codegen(), name, bitcode)
+    library._reload_init.update(begin)
+    nothing = CompileResult(*[None] * len(CompileResult._fields))
+    return nothing._replace(library=library, fndesc=fndesc, signature=signature, entry_point=object(), objectmode=False)
+
+
 class _Dispatcher(CPUDispatcher):
+    def __init__(self, function, variables, options, **others):
+        super().__init__(function, variables, options, **others)
+        if is_ours(function.__module__):  # a global of a user's may change
+            self._cache = _CalleeCache(function, options)
+
     def get_call_template(self, args, kws):
         """One kernel for all constants that it is called with: what LLVM inlines, it makes anew for each of them."""
         return super().get_call_template(tuple(map(types.unliteral, args)), kws)

@@ -68,6 +68,14 @@ def deep_hash(function):
     return digest.hexdigest()[:24]
 
 
+def types_hash(kinds):
+    """Hash Numba's types with the names of their fields."""
+    digest = hashlib.sha256()
+    for kind in kinds:
+        _add_type(digest, kind)
+    return digest.hexdigest()[:12]
+
+
 def _plain(value):
     """The Python function of a dispatcher or of an intrinsic; whatever else as it is."""
     if isinstance(value, (types.FunctionType, type)):

@@ -4,14 +4,9 @@ import math
 import os
 
 import pytest
-from numba import types
-from numba.core.registry import cpu_target
 
 from tests.helpers.processes import REPORT, ROOT, SMALL, edit, run
 from tests.helpers.tolerances import ROUNDING
-from tsdyn.jit import compilers, stock
-
-own = pytest.mark.skipif(compilers.current() is stock, reason="Numba's own cache stores no code to link in")
 
 
 @pytest.mark.slow
@@ -54,63 +49,6 @@ def test_kernels_in_a_sub_package_follow_an_edit_of_their_callees(package):
     edit(folder / "inner.py", "3.0", "5.0")
     edited, _ = run(code, environment, package)
     assert (edited["value"], edited["misses"]) == (10.0, 1)
-
-
-LOWERED = """
-from tsdyn.jit import backend
-own, lowered = backend._CalleeLowering.run_pass, []
-def run_pass(self, state):
-    lowered.append(state.func_id.func_name)
-    return own(self, state)
-backend._CalleeLowering.run_pass = run_pass
-from tsdyn.below.outer import once
-report(value=once(1.0), lowered=lowered)
-"""
-
-
-@own
-@pytest.mark.slow
-@pytest.mark.parametrize("damaged", [False, True])
-def test_what_one_process_has_lowered_another_links_in(package, damaged):
-    folder = package / "tsdyn" / "below"
-    folder.mkdir()
-    (folder / "__init__.py").touch()
-    (folder / "inner.py").write_text("from ..jit.kernels import kernel\n@kernel\ndef level(x):\n    return 3.0 * x\n")
-    (folder / "outer.py").write_text(
-        "from ..jit.kernels import entry\nfrom .inner import level\n@entry\ndef once(x):\n    return level(x)\n"
-        "@entry\ndef twice(x):\n    return 2.0 * level(x)\n"
-    )
-    environment = {"NUMBA_CACHE_DIR": str(package / "cache")}
-    first, _ = run(REPORT + LOWERED, environment, package)
-    if damaged:
-        for file in (package / "cache").rglob("*level*.callee"):
-            file.write_bytes(file.read_bytes()[:-1])
-    other, _ = run((REPORT + LOWERED).replace("once", "twice"), environment, package)
-    assert (first["value"], "level" in first["lowered"]) == (3.0, True)
-    assert (other["value"], other["lowered"]) == (6.0, ["level"] * damaged)
-    edit(folder / "inner.py", "3.0", "5.0")
-    edited, _ = run(REPORT + LOWERED, environment, package)
-    assert (edited["value"], edited["lowered"]) == (5.0, ["level"])
-
-
-@own
-def test_a_kernel_of_other_options_is_lowered_anew(monkeypatch):
-    from tsdyn.jit import backend
-
-    def compiled(**options):
-        made = backend.callee(backend._twice.py_func, {"error_model": "numpy", **options})
-        made.compile((types.int64,))
-        return made.overloads[types.int64,].signature
-
-    def lower(self, state):
-        raise NotImplementedError
-
-    cpu_target.target_context.refresh()
-    first = compiled()
-    monkeypatch.setattr(backend._CalleeLowering, "run_pass", lower)
-    assert compiled() == first == types.int64(types.int64)
-    with pytest.raises(NotImplementedError):
-        compiled(boundscheck=True)
 
 
 @pytest.mark.slow

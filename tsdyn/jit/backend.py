@@ -15,6 +15,7 @@ import importlib
 import inspect
 import json
 import pickle
+import re
 import time
 import warnings
 from functools import cache, cached_property, partial
@@ -38,7 +39,7 @@ from numba.extending import infer_getattr, lower_getattr_generic, models, regist
 
 from ..errors import CompilerWarning
 from . import cache as files
-from .code_hash import is_ours, types_hash, versions
+from .code_hash import deep_hash, is_ours, types_hash, versions
 from .target import chosen as target
 from .target import portable
 
@@ -95,6 +96,7 @@ codegen.CPUCodeLibrary.__init__:_linking_libraries
 codegen.CPUCodeLibrary.__init__:_final_module
 codegen.CPUCodeLibrary._get_module_for_linking(self)
 codegen.CPUCodeLibrary._get_module_for_linking:_shared_module
+codegen.CPUCodeLibrary._finalize_dynamic_globals(self)
 codegen.CPUCodeLibrary._optimize_functions(self, ll_module)
 codegen.CPUCodeLibrary._optimize_functions:_data_layout
 codegen.CPUCodegen._function_pass_manager(self, kwargs)
@@ -121,6 +123,9 @@ ccallback.CFunc.__init__:_cache
 ccallback.CFunc.compile(self)
 caching._Cache.load_overload(self, sig, target_context)
 caching._Cache.save_overload(self, sig, data)
+bytecode.FunctionIdentity.from_function:unique_id
+itanium_mangler.mangle_identifier(ident, template_params, abi_tags, uid)
+funcdesc.FunctionDescriptor._from_python_function:unique_id
 funcdesc.FunctionDescriptor.__init__:typemap
 funcdesc.FunctionDescriptor.__init__:calltypes
 compiler.CompileResult._fields
@@ -145,7 +150,8 @@ _SERVE_OTHERS = {  # passes for closures, with blocks, exceptions, literal_unrol
     typed_passes.NopythonRewrites,
     typed_passes.DumpParforDiagnostics,
 }
-_DYNAMIC = "numba.dynamic.globals"  # how names of addresses of the process begin
+_NUMBA = "_ZN5numba"  # how names of Numba's own functions begin
+_NUMBERED = re.compile(r"B\d+v\d")  # in a name: a number by which Numba tells functions of one name apart
 _OPTIONAL = "__array__", "static_getitem", "static_setitem"  # of which no type need have an implementation
 _of_ours = {}  # way of lowering: passes over tsdyn's own kernels
 
@@ -284,11 +290,18 @@ class _Library(_Kernel):
             self._finalized = True
 
     def finalize(self):
-        """Link in what the kernel calls, and leave optimising to whoever links this in."""
+        """Link in what the kernel calls, and leave optimising to whoever links this in.
+
+        Numba tells its own functions apart by numbers of this process, too. They are named after the kernel here.
+        """
         self._raise_if_finalized()
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        bodies = [function for function in self._final_module.functions if not function.is_declaration]
+        for i, function in enumerate(one for one in bodies if one.name.startswith(_NUMBA)):
+            function.name = f"{self.name}.{i}"
+        self._finalize_dynamic_globals()
         self._finalized = True
 
 
@@ -300,7 +313,7 @@ class _CalleeLowering(typed_passes.NativeLowering):
         """As Numba's own, into a library of the kind above, without wrappers."""
         flags, context = state.flags, state.targetctx
         flags.no_cpython_wrapper = flags.no_cfunc_wrapper = flags.no_compile = True
-        state.library = _Library(context.codegen(), state.func_id.func_qualname)
+        state.library = _Library(context.codegen(), str(state.func_id.unique_id))
         super().run_pass(state)
         key = object()  # by which its callers find it
         context.insert_user_function(key, state.cr.fndesc, [state.library])
@@ -310,6 +323,30 @@ class _CalleeLowering(typed_passes.NativeLowering):
 
 class _CalleeCompiler(Compiler):
     lowering = _CalleeLowering
+
+    def define_pipelines(self):
+        """As of `Compiler`, for a kernel that is told from others of its name by its code.
+
+        Numba numbers them, in each process anew: of two with one number, a third process would link one for both.
+        """
+        function = self.state.func_id.func
+        if _can_be_stored(function, self.state.args):
+            self.state.func_id.unique_id = f"h{deep_hash(function)}{types_hash(self.state.args)}"
+        return super().define_pipelines()
+
+
+def _can_be_stored(function, kinds):
+    """Not of a user's, whose globals may change; nor what takes a function of this process."""
+    return is_ours(function.__module__) and not any(map(_has_code, kinds))
+
+
+def _has_code(kind):
+    return isinstance(kind, types.Callable) or (isinstance(kind, types.BaseTuple) and any(map(_has_code, kind.types)))
+
+
+def _is_numbered(function):
+    """Whether the name of a function with a body has a number of this process."""
+    return not function.is_declaration and _NUMBERED.search(function.name) is not None
 
 
 class _CalleeCache(_Cache):
@@ -339,14 +376,12 @@ class _CalleeCache(_Cache):
     def save_overload(self, sig, data):
         """Store the kernel."""
         library, fndesc = data.library, data.fndesc
-        if any(isinstance(kind, types.Callable) for kind in sig):  # a function of this process
-            return
-        bitcode = library._get_module_for_linking().as_bitcode()
-        if files.folder() is None or any(name.encode() in bitcode for name in (_DYNAMIC, RuntimeLinker.PREFIX)):
+        module = library._get_module_for_linking()
+        if files.folder() is None or _depends_on_process(library) or any(map(_is_numbered, module.functions)):
             return
         fndesc.typemap = fndesc.calltypes = None
         try:
-            kept = library.name, tuple(library._reload_init), bitcode, fndesc, data.signature
+            kept = library.name, tuple(library._reload_init), module.as_bitcode(), fndesc, data.signature
             files.save(self._file(sig), pickle.dumps(kept))
         except OSError as error:
             files.warn_unwritable(error)
@@ -355,7 +390,7 @@ class _CalleeCache(_Cache):
 
 
 def _linkable(payload, context):
-    """The kernel of a stored one."""
+    """The kernel of a stored one: a pickle, as Numba's own are, out of a folder that only the user writes to."""
     name, begin, bitcode, fndesc, signature = pickle.loads(payload)
     for call in begin:
         call()

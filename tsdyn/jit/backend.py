@@ -349,11 +349,8 @@ def _is_numbered(function):
     return not function.is_declaration and _NUMBERED.search(function.name) is not None
 
 
-class _CalleeCache(_Cache):
-    """The disk cache of a kernel that kernels call: LLVM's code of it, which other processes link into theirs."""
-
-    def __init__(self, function, options):
-        self._function, self._options = function, sorted(options.items())
+class _Store(_Cache):
+    """A disk cache of one function."""
 
     @property
     def cache_path(self):
@@ -364,6 +361,13 @@ class _CalleeCache(_Cache):
         """Do nothing: kernels are always cached."""
 
     disable = flush = enable
+
+
+class _CalleeCache(_Store):
+    """The disk cache of a kernel that kernels call: LLVM's code of it, which other processes link into theirs."""
+
+    def __init__(self, function, options):
+        self._function, self._options = function, sorted(options.items())
 
     def _file(self, kinds):
         key = files.key_of((types_hash(kinds), self._options), target())
@@ -611,8 +615,8 @@ def attributes(kind, resolve, lower):
     return lambda kind, names: None
 
 
-class KernelCache(_Cache):
-    """The disk cache of one function, with a lock so that processes starting together compile once."""
+class KernelCache(_Store):
+    """The disk cache of a kernel with machine code, with a lock so that processes starting together compile once."""
 
     def __init__(self, function, suffix="kernel"):
         self._function, self._suffix = function, suffix
@@ -621,16 +625,6 @@ class KernelCache(_Cache):
     @cached_property
     def _name(self):
         return files.name_of(self._function)  # at first use, when all that the function names is defined
-
-    @property
-    def cache_path(self):
-        """The folder that kernels are written to."""
-        return str(files.folder())
-
-    def enable(self):
-        """Do nothing: kernels are always cached."""
-
-    disable = flush = enable
 
     def file(self, signature):
         """The name of the file for a signature."""

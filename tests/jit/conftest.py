@@ -29,7 +29,7 @@ def warm(tmp_path):
     def prepare(code):
         first, _ = run(code, {})
         folder = Path(first["folder"])
-        partial = shutil.ignore_patterns("*.kernel.*")  # another process is about to rename them
+        partial = shutil.ignore_patterns("*.kernel.*", "*.callee.*")  # another process is about to rename them
         shutil.copytree(folder, tmp_path / "warm" / "tsdyn" / folder.name, ignore=partial, copy_function=_linked)
         return first, {"NUMBA_CACHE_DIR": str(tmp_path / "warm")}
 

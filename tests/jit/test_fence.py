@@ -9,6 +9,7 @@ import re
 import llvmlite.binding
 import numba
 import pytest
+from numba.core.itanium_mangler import mangle
 from numba.extending import intrinsic
 
 import tsdyn as ts
@@ -40,6 +41,13 @@ def test_callbacks_of_llvm_have_names_that_ctrl_c_knows():
         f"tsdyn counts on LLVM calling functions {backend.CALLBACK_FRAMES}* of llvmlite.binding.ExecutionEngine, in "
         f"which a Ctrl-C is lost and therefore deferred; llvmlite {llvmlite.__version__} has none"
     )
+
+
+def test_numbers_in_names_are_found():
+    name = mangle("numba.max", (numba.float64,), abi_tags=("flags",), uid=7)
+    assert backend._NUMBERED.search(name), f"tsdyn counts on numbers in names of functions, {name} has none: {VERSIONS}"
+    assert name.startswith(backend._NUMBA)
+    assert not backend._NUMBERED.search(mangle("tsdyn.max", (numba.float64,), abi_tags=("flags",), uid="h7"))
 
 
 def test_dispatchers_and_intrinsics_show_the_function_that_the_hash_follows():

@@ -117,9 +117,9 @@ for method in METHODS:
 report()
 """
     )
-    _, environment = warm(code.replace("METHODS:", "(tsdyn.integrators.RK45,):"))  # all of the core is in the cache
+    _, environment = warm(code)  # all of the core is in the cache
     for file in Path(environment["NUMBA_CACHE_DIR"]).rglob("*plug_in_integrator*"):
-        file.unlink()  # left by whoever has run the example before
+        file.unlink()
     assert run(code, environment)[0]["misses"] == 3  # two step kernels and an error estimate: nothing of the core
     assert run(code, environment)[0]["misses"] == 0
 
@@ -193,7 +193,10 @@ report(q=ends)
 @pytest.mark.slow
 def test_new_motions_compile_nothing(warm):
     """Whatever is prescribed is numbers for kernels that are there."""
-    few, more = "(M.Ramp(), M.Ramp())", "(np.tanh(M.Ramp(0.0, 3.0)), M.Exponential(1.0, 2.0) * M.Sine(1.0, 3.0))"
+    few, more = (
+        "(np.tanh(M.Ramp()), M.Ramp())",
+        "(np.tanh(M.Ramp(0.0, 3.0)), M.Exponential(1.0, 2.0) * M.Sine(1.0, 3.0))",
+    )
     first, environment = warm(DRIVEN.replace("MORE", few))
     second, errors = run(DRIVEN.replace("MORE", more), environment)
     assert second["misses"] == 0

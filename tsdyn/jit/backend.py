@@ -3,7 +3,8 @@
 Numba optimises every function with all that it calls linked in, and makes machine code of it and of two wrappers, for
 Python and for C. Of a kernel that only kernels call all of that is lost: its callers link it in and do it again. Here
 such a kernel is lowered and left at that, operators are typed once for the same operands, and passes over the code that
-serve no kernel of tsdyn's are left out. Compiled kernels are stored under a hash of all code that they depend on.
+serve no kernel of tsdyn's are left out. Compiled kernels are stored under a hash of all code that they depend on, and
+so are those that kernels link in: what one process has lowered no other one lowers again.
 
 This file alone uses what isn't Numba's or llvmlite's public interface: SEEN lists it, `check` looks whether it is
 there. Where it isn't, or fails, stock.py takes its place (compilers.py).
@@ -14,6 +15,7 @@ import importlib
 import inspect
 import json
 import pickle
+import re
 import time
 import warnings
 from functools import cache, cached_property, partial
@@ -37,7 +39,7 @@ from numba.extending import infer_getattr, lower_getattr_generic, models, regist
 
 from ..errors import CompilerWarning
 from . import cache as files
-from .code_hash import is_ours, versions
+from .code_hash import deep_hash, is_ours, types_hash, versions
 from .target import chosen as target
 from .target import portable
 
@@ -93,6 +95,8 @@ codegen.CPUCodeLibrary.__init__(self, codegen, name)
 codegen.CPUCodeLibrary.__init__:_linking_libraries
 codegen.CPUCodeLibrary.__init__:_final_module
 codegen.CPUCodeLibrary._get_module_for_linking(self)
+codegen.CPUCodeLibrary._get_module_for_linking:_shared_module
+codegen.CPUCodeLibrary._finalize_dynamic_globals(self)
 codegen.CPUCodeLibrary._optimize_functions(self, ll_module)
 codegen.CPUCodeLibrary._optimize_functions:_data_layout
 codegen.CPUCodegen._function_pass_manager(self, kwargs)
@@ -119,6 +123,14 @@ ccallback.CFunc.__init__:_cache
 ccallback.CFunc.compile(self)
 caching._Cache.load_overload(self, sig, target_context)
 caching._Cache.save_overload(self, sig, data)
+bytecode.FunctionIdentity.from_function:unique_id
+itanium_mangler.mangle_identifier(ident, template_params, abi_tags, uid)
+funcdesc.FunctionDescriptor._from_python_function:unique_id
+funcdesc.FunctionDescriptor.__init__:typemap
+funcdesc.FunctionDescriptor.__init__:calltypes
+compiler.CompileResult._fields
+dispatcher.Dispatcher.compile:load_overload
+dispatcher.Dispatcher.compile:insert_user_function
 options.DefaultOptions._nrt
 compiler.Flags.no_cpython_wrapper
 compiler.Flags.no_cfunc_wrapper
@@ -138,6 +150,8 @@ _SERVE_OTHERS = {  # passes for closures, with blocks, exceptions, literal_unrol
     typed_passes.NopythonRewrites,
     typed_passes.DumpParforDiagnostics,
 }
+_NUMBA = "_ZN5numba"  # how names of Numba's own functions begin
+_NUMBERED = re.compile(r"B\d+v\d")  # in a name: a number by which Numba tells functions of one name apart
 _OPTIONAL = "__array__", "static_getitem", "static_setitem"  # of which no type need have an implementation
 _of_ours = {}  # way of lowering: passes over tsdyn's own kernels
 
@@ -269,12 +283,25 @@ class Compiler(CompilerBase):
 class _Library(_Kernel):
     """The code of a kernel and of those that it calls, to be linked into others."""
 
+    def __init__(self, codegen, name, bitcode=None):
+        super().__init__(codegen, name)
+        if bitcode is not None:  # as it was stored
+            self._shared_module = self._final_module = llvm.parse_bitcode(bitcode)
+            self._finalized = True
+
     def finalize(self):
-        """Link in what the kernel calls, and leave optimising to whoever links this in."""
+        """Link in what the kernel calls, and leave optimising to whoever links this in.
+
+        Numba tells its own functions apart by numbers of this process, too. They are named after the kernel here.
+        """
         self._raise_if_finalized()
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        bodies = [function for function in self._final_module.functions if not function.is_declaration]
+        for i, function in enumerate(one for one in bodies if one.name.startswith(_NUMBA)):
+            function.name = f"{self.name}.{i}"
+        self._finalize_dynamic_globals()
         self._finalized = True
 
 
@@ -286,7 +313,7 @@ class _CalleeLowering(typed_passes.NativeLowering):
         """As Numba's own, into a library of the kind above, without wrappers."""
         flags, context = state.flags, state.targetctx
         flags.no_cpython_wrapper = flags.no_cfunc_wrapper = flags.no_compile = True
-        state.library = _Library(context.codegen(), state.func_id.func_qualname)
+        state.library = _Library(context.codegen(), str(state.func_id.unique_id))
         super().run_pass(state)
         key = object()  # by which its callers find it
         context.insert_user_function(key, state.cr.fndesc, [state.library])
@@ -297,8 +324,92 @@ class _CalleeLowering(typed_passes.NativeLowering):
 class _CalleeCompiler(Compiler):
     lowering = _CalleeLowering
 
+    def define_pipelines(self):
+        """As of `Compiler`, for a kernel that is told from others of its name by its code.
+
+        Numba numbers them, in each process anew: of two with one number, a third process would link one for both.
+        """
+        function = self.state.func_id.func
+        if _can_be_stored(function, self.state.args):
+            self.state.func_id.unique_id = f"h{deep_hash(function)}{types_hash(self.state.args)}"
+        return super().define_pipelines()
+
+
+def _can_be_stored(function, kinds):
+    """Not of a user's, whose globals may change; nor what takes a function of this process."""
+    return is_ours(function.__module__) and not any(map(_has_code, kinds))
+
+
+def _has_code(kind):
+    return isinstance(kind, types.Callable) or (isinstance(kind, types.BaseTuple) and any(map(_has_code, kind.types)))
+
+
+def _is_numbered(function):
+    """Whether the name of a function with a body has a number of this process."""
+    return not function.is_declaration and _NUMBERED.search(function.name) is not None
+
+
+class _Store(_Cache):
+    """A disk cache of one function."""
+
+    @property
+    def cache_path(self):
+        """The folder that kernels are written to."""
+        return str(files.folder())
+
+    def enable(self):
+        """Do nothing: kernels are always cached."""
+
+    disable = flush = enable
+
+
+class _CalleeCache(_Store):
+    """The disk cache of a kernel that kernels call: LLVM's code of it, which other processes link into theirs."""
+
+    def __init__(self, function, options):
+        self._function, self._options = function, sorted(options.items())
+
+    def _file(self, kinds):
+        key = files.key_of((types_hash(kinds), self._options), target())
+        return f"{files.name_of(self._function)}-{key}{files.CALLEE}"
+
+    def load_overload(self, sig, target_context):
+        """Return the kernel, or None."""
+        return files.load(self._file(sig), partial(_linkable, context=_for_target(target_context)))
+
+    def save_overload(self, sig, data):
+        """Store the kernel."""
+        library, fndesc = data.library, data.fndesc
+        module = library._get_module_for_linking()
+        if files.folder() is None or _depends_on_process(library) or any(map(_is_numbered, module.functions)):
+            return
+        fndesc.typemap = fndesc.calltypes = None
+        try:
+            kept = library.name, tuple(library._reload_init), module.as_bitcode(), fndesc, data.signature
+            files.save(self._file(sig), pickle.dumps(kept))
+        except OSError as error:
+            files.warn_unwritable(error)
+        except (AttributeError, TypeError, pickle.PicklingError):  # a type of this process alone
+            return
+
+
+def _linkable(payload, context):
+    """The kernel of a stored one: a pickle, as Numba's own are, out of a folder that only the user writes to."""
+    name, begin, bitcode, fndesc, signature = pickle.loads(payload)
+    for call in begin:
+        call()
+    library = _Library(context.codegen(), name, bitcode)
+    library._reload_init.update(begin)
+    nothing = CompileResult(*[None] * len(CompileResult._fields))
+    return nothing._replace(library=library, fndesc=fndesc, signature=signature, entry_point=object(), objectmode=False)
+
 
 class _Dispatcher(CPUDispatcher):
+    def __init__(self, function, variables, options, **others):
+        super().__init__(function, variables, options, **others)
+        if is_ours(function.__module__):  # a global of a user's may change
+            self._cache = _CalleeCache(function, options)
+
     def get_call_template(self, args, kws):
         """One kernel for all constants that it is called with: what LLVM inlines, it makes anew for each of them."""
         return super().get_call_template(tuple(map(types.unliteral, args)), kws)
@@ -504,8 +615,8 @@ def attributes(kind, resolve, lower):
     return lambda kind, names: None
 
 
-class KernelCache(_Cache):
-    """The disk cache of one function, with a lock so that processes starting together compile once."""
+class KernelCache(_Store):
+    """The disk cache of a kernel with machine code, with a lock so that processes starting together compile once."""
 
     def __init__(self, function, suffix="kernel"):
         self._function, self._suffix = function, suffix
@@ -514,16 +625,6 @@ class KernelCache(_Cache):
     @cached_property
     def _name(self):
         return files.name_of(self._function)  # at first use, when all that the function names is defined
-
-    @property
-    def cache_path(self):
-        """The folder that kernels are written to."""
-        return str(files.folder())
-
-    def enable(self):
-        """Do nothing: kernels are always cached."""
-
-    disable = flush = enable
 
     def file(self, signature):
         """The name of the file for a signature."""

@@ -34,6 +34,7 @@ _KEEP = 30 * _DAY  # files that nothing has read for so long are deleted
 _told = []
 _CHECKSUM = hashlib.sha256().digest_size
 FORMAT = 3  # of the files
+CALLEE = ".callee"  # how the names of those end that kernels link in
 
 
 def _bases():
@@ -214,22 +215,23 @@ def report(file, error, delete=True):
 def contents():
     """What is in the folder of kernels: {"folder", "kernels", "stock", "bytes", "damaged", "failures"}.
 
-    kernels: how many of tsdyn's own way; stock: of Numba's as it comes; damaged: [(file, cause)] of files whose
-    checksum is wrong; failures: lines on those that couldn't be loaded before.
+    kernels: how many of tsdyn's own way; stock: of Numba's as it comes; bytes: of the former, with what they link in;
+    damaged: [(file, cause)] of files whose checksum is wrong; failures: lines on those that couldn't be loaded before.
     """
-    path, damaged, failures, sizes = folder(), [], [], []
-    for file in sorted(path.glob("*.kernel")) if path else ():
+    path, damaged, failures, sizes, kernels = folder(), [], [], [], 0
+    for file in sorted([*path.glob("*.kernel"), *path.glob(f"*{CALLEE}")]) if path else ():
         try:
             content = validation.read(file, flags=validation.NO_LINKS)
             opened(file.name, content)
             sizes.append(len(content))
+            kernels += file.suffix != CALLEE
         except (OSError, ValueError) as error:
             damaged.append((file.name, f"{type(error).__name__}: {error}"))
     with contextlib.suppress(OSError):
         failures = (path / FAILURES).read_text(encoding="utf-8").splitlines() if path else []
     return {
         "folder": path and str(path),
-        "kernels": len(sizes),
+        "kernels": kernels,
         "stock": sum(1 for _ in path.glob("stock/*.stored")) if path else 0,
         "bytes": sum(sizes),
         "damaged": damaged,
@@ -261,7 +263,7 @@ def environment():
 
 def remove_partial_files(process):
     """Delete what a process that was killed has left."""
-    for file in folder().glob(f"*.kernel.{process}-*"):
+    for file in folder().glob(f"*.{process}-*"):
         with contextlib.suppress(OSError):
             file.unlink()
 

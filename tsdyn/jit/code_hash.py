@@ -68,6 +68,14 @@ def deep_hash(function):
     return digest.hexdigest()[:24]
 
 
+def types_hash(kinds):
+    """Hash Numba's types with the names of their fields."""
+    digest = hashlib.sha256()
+    for kind in kinds:
+        _add_type(digest, kind)
+    return digest.hexdigest()[:12]
+
+
 def _plain(value):
     """The Python function of a dispatcher or of an intrinsic; whatever else as it is."""
     if isinstance(value, (types.FunctionType, type)):
@@ -183,7 +191,8 @@ def _add_type(digest, kind):
     digest.update(f"{kind}\0".encode())
     _add_module(digest, sys.modules[type(kind).__module__])
     kind = getattr(kind, "kind", kind)  # a named tuple in memory
-    if isinstance(kind, numba.types.BaseNamedTuple):
-        digest.update(repr(kind.fields).encode())
+    if isinstance(kind, numba.types.BaseNamedTuple):  # a stored kernel imports its class
+        digest.update(f"{kind.instance_class.__module__} {kind.fields}".encode())
+    if isinstance(kind, numba.types.BaseTuple):
         for field in kind.types:
             _add_type(digest, field)

@@ -41,6 +41,10 @@ class Lane(types.Type):
         self.lane = lane_type(width) if threes else self
         self.four = FourLanes(self.lane, 3 if threes else 4)
 
+    def __reduce__(self):
+        """By what it is made of: Numba's own way of a stored type can't follow one that refers to itself."""
+        return Lane, (self.width, self.threes)
+
     def can_convert_from(self, typing, other):
         """Plain numbers are the same in all lanes."""
         if isinstance(other, Lane):
@@ -58,6 +62,10 @@ class FourLanes(types.Type):
     def __init__(self, lane, count):
         self.lane, self.count, self.four = lane, count, self
         super().__init__(name=f"FourLanes({lane.width}, {count})")
+
+    def __reduce__(self):
+        """As of `Lane`."""
+        return FourLanes, (self.lane, self.count)
 
     @property
     def three(self):

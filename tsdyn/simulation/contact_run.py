@@ -149,6 +149,7 @@ class _ContactRun(Transitions, Checkpoints):
         self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
         self.halting, self.known_fast = None, {}  # of the phase: `Halting`; what a checkpoint has of it
+        self.slowing = None  # and `Slowing`
         self.hits = {}  # of gaps after impacts: the time, and the largest rate since and just before
 
     def _take_scene(self, scene, inactive=None, values=None):
@@ -511,11 +512,11 @@ class _ContactRun(Transitions, Checkpoints):
             starting = {i: 2.0 * STOPPED * paces[i] for i in idle}
         else:
             rates = frictions.sizes(self.q, self.qdd, self.length)
-        slowing = Slowing(frictions, modes.begun, starting, rates, modes.turning).over
+        self.slowing = Slowing(frictions, modes.begun, starting, rates, modes.turning)
         for i in range(frictions.count):
             if i in modes.blocked and i not in starting:
                 continue
-            function = GroupMember(breaking, loaded.index(i)) if i in loaded else GroupMember(slowing, i)
+            function = GroupMember(breaking, loaded.index(i)) if i in loaded else GroupMember(self.slowing.over, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _starts(self):

@@ -50,6 +50,8 @@ class Transitions:
         if self._has_fallen(fired) or self._is_deep(sunk) or self._is_stuck():
             return Status.CONTACT_FAILED
         count, own, before = self.gaps.count, self.frictions.count, self.modes
+        if self.slowing is not None:
+            before.turning = self.slowing.turning
         # What was to rise by less than rounding, and has risen by more, is open
         hit = [i for i in fired if i < count and (i not in before.lifted or i in self.near)]
         low = FLIGHT * self.gaps.lengths(self.length)

@@ -15,7 +15,7 @@ from ..model.equations import recall
 from ..model.laws import calls_laws
 from ..runs.group_search import VALUES, KernelFunctions
 from ..workspaces import load_parts
-from .tolerances import LOADED, REACTION_NOISE, TURNS
+from .tolerances import FASTER, LOADED, REACTION_NOISE, TURNS
 
 
 class Closing:
@@ -207,8 +207,13 @@ def find_slowing(parts, own, t, state, out, t0, before, near):  # eight: VALUES
     x = load_slowing(own)
     n, count = x.sizes[0], x.sizes[1]
     now, values, v, axis, d = matrix(state, 3, n), vector(out, count), stack(3), stack(3), stack(3)
+    earlier = matrix(before, 3, n)  # where the step began
     for u in range(count):
         o, one = 3 * u, x.table[INTS * u : INTS * (u + 1)]
+        if x.begun[3, u] > 0.0:
+            slip_velocity(earlier[0], earlier[1], one, x.points[o : o + 3], x.axes[o : o + 3], v, axis)
+            if math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) > FASTER * x.begun[3, u]:
+                x.begun[3, u] = 0.0
         slip_velocity(now[0], now[1], one, x.points[o : o + 3], x.axes[o : o + 3], v, axis)
         # The direction: a sign along the axis, or a vector
         square = 0.0
@@ -248,7 +253,8 @@ class Slowing(KernelFunctions):
         Sizes of the terms of accelerations.
     turning : dict
         Of those that begin to slide in a plane: the velocity up to which friction keeps its direction, by their
-        numbers. Less across that direction is no turn; without an acceleration, a part of it back is no end.
+        numbers. Less across that direction is no turn; without an acceleration, a part of it back is no end. Until the
+        slip has been faster at the start of a step.
 
     Attributes
     ----------
@@ -270,7 +276,13 @@ class Slowing(KernelFunctions):
         own, *self._keep = resident(
             SlowingParts(memory, frictions.table, frictions.points, frictions.axes, ways, signed, starts, sizes)
         )
+        self._turning = starts[3]
         self.functions = self.kernel = find_slowing, own, own, count, memory
+
+    @property
+    def turning(self):
+        """Those of `turning` whose slips haven't been faster yet."""
+        return {i: most for i, most in enumerate(self._turning.tolist()) if most > 0.0}
 
 
 KERNELS = find_breaking, find_slowing

@@ -90,6 +90,8 @@ def test_a_plate_on_three_rough_points_slides_where_all_friction_is_used(static)
         # Three slips begin together, with directions that turn
         (((0.5, 0.1), (-0.4, 0.6), (-0.3, -0.5)), (0.8, 0.6), (0.4, -0.7), (0.3, 0.6, 0.45), (0.3, 0.6, 0.45)),
         (((0.5, 0.1), (-0.4, 0.6), (-0.3, -0.5)), (-0.2, 1.0), (-0.7, 0.2), (0.3, 0.6, 0.45), (0.4, 0.6, 0.6)),
+        # One slip ends slowly, turning, after it has been fast
+        (((0.5, -0.47), (0.06, 0.49), (-0.78, -0.37)), (-0.93, 0.38), (0.09, -0.37), (0.76, 0.49), (0.87, 0.53)),
     ],
 )
 def test_slips_that_begin_in_several_directions_are_those_of_unilateral_contacts(

@@ -254,10 +254,8 @@ def _together(inertia, resting, found, qd, fired):
     others = [i for i in inertia.which if i not in which]
     if (left < 0.0).any() or (gdd[others] < -small[others]).any():
         return None
-    gains, begun = (
-        {i: moves[i] for i in held if grips.get(i) is not None and slips[i].any()},
-        {i: float(gain[i]) for i in ways},
-    )
+    gains = {i: moves[i] for i in held if grips.get(i) is not None and slips[i].any()}
+    begun = {i: float(gain[i]) for i in ways}
     idle = [i for i in held if i not in closed]
     slack = slack_of(inertia, which, N, small)
     return ContactState(

@@ -300,9 +300,10 @@ class RestProblem:
             along = along / np.abs(along).max()  # whose square may be zero
             ways[i] = along @ self.bases[i] / np.linalg.norm(along)
         known = {*sticking, *self.light, *(unloaded - self.rows.keys())}
-        # The slip of what begins without an acceleration is no more than time after time squared
-        turning = {i for i in ways if not (self.place.frictions.signed[i] or i in self.light or self.is_dead(i))}
-        rates = {i: rate for i, rate in rates.items() if rate or i not in turning}
+        signed = self.place.frictions.signed
+        turning = {i for i in ways if not (signed[i] or i in self.light or self.is_dead(i))}
+        # In a plane a slip that begins without an acceleration has no rate: it may turn back at once
+        rates = {i: rate for i, rate in rates.items() if rate or signed[i]}
         limits, partial = {i: limits[i] for i in sorted(known)}, self._partial(sticking) if self.sharing else {}
         return FrictionAtRest(sticking, ways, turning, blocked, N, rates, self.sharing, partial, limits)
 

@@ -42,13 +42,20 @@ def _points(gaps, which):
     return np.column_stack([np.ones(len(which)), (places - places.mean(axis=0)) / (size if size > 0.0 else 1.0)])
 
 
-def shares_of(gaps, closed, dependent):
-    """Yield each group of which some are `dependent`: its gaps (c), those with rows (r), and S (c, r), Eq. (2)."""
+def sharing_groups(gaps, closed, dependent):
+    """Yield each group of which some are `dependent`: its gaps (c), and those with rows (r)."""
     for members in groups_of(gaps, closed) if len(dependent) else ():
         own = [i for i in members if i not in dependent]
-        if len(own) == 1 < len(members):
+        if len(own) < len(members):
+            yield members, own
+
+
+def shares_of(gaps, closed, dependent):
+    """Yield the same groups, each with S (c, r), Eq. (2)."""
+    for members, own in sharing_groups(gaps, closed, dependent):
+        if len(own) == 1:
             yield members, own, np.full((len(members), 1), 1.0 / len(members))
-        elif len(own) < len(members):
+        else:
             points = _points(gaps, members)
             C = least_squares(points[[members.index(i) for i in own]].T, points.T, RANK_TOL).T
             yield members, own, least_squares(C.T, np.eye(len(own)), RANK_TOL)
@@ -81,7 +88,7 @@ def lifts_of(gaps, closed, dependent, idle):
 def rows_of_closed(gaps, closed, dependent, values):
     """Of `values` (count, ...) of gaps those of the rows that hold closed ones: a mean where one row is of several."""
     found = values[[i for i in closed if i not in dependent]]
-    for members, own, _ in shares_of(gaps, closed, dependent):
+    for members, own in sharing_groups(gaps, closed, dependent):
         if len(own) == 1:
             found[[i for i in closed if i not in dependent].index(own[0])] = values[members].mean(axis=0)
     return found

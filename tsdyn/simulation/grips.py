@@ -4,7 +4,7 @@ import numpy as np
 
 from ..analyses.contact_friction import share
 from ..analyses.contact_problem import slip_rows
-from ..analyses.shared_loads import law_of, loads_of, shares_of
+from ..analyses.shared_loads import law_of, loads_of, shares_of, sharing_groups
 from ..analyses.tolerances import EVENT_ERROR, LEAST_SLIP
 from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
@@ -115,7 +115,7 @@ def stopping_time(inertia, which, qd, after, qdd, slow):
 def gap_row(gaps, modes, i):
     """The primitive whose first row is the gap of a closed contact in a phase."""
     gap = gaps.list[i]
-    for members, own, _ in shares_of(gaps, modes.closed, modes.dependent):
+    for members, own in sharing_groups(gaps, modes.closed, modes.dependent):
         if own == [i]:
             return _mean_row(gaps, members)
     return gap.side.grip.gap if modes.slides(i) else gap.side.row

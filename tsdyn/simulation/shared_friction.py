@@ -23,11 +23,11 @@ class SharedFriction:
         self.frictions, self.gaps = frictions, gaps
 
     def at(self, packed, t, q, qd, memory, lam, N):
-        """The `FrictionShares` at one state, rows and multipliers (3,), ground frame, of each unit; the loads.
+        """The `FrictionShares` at one state, multipliers (c, 3), ground frame, normal loads (frictions,) with these.
 
-        packed: of the phase; memory (slots,), by which frictions are at rest; lam (m,), N (frictions,): multipliers and
-        normal loads, by the rows of the phase. The shares are followed by the change of the multipliers of bilateral
-        rows.
+        Then by how much these change the multipliers of bilateral rows, and of each friction its rows and their
+        directions. packed: of the phase; memory (slots,), by which frictions are at rest; lam (m,), N (frictions,):
+        multipliers and normal loads, by the rows of the phase.
         """
         frictions, held = self.frictions, self._held(memory)
         place, directions, forces = frictions.at(q, np.ones(frictions.count), 0.0), [], np.zeros((len(held), 3))

@@ -368,10 +368,7 @@ class Transitions:
         self._keep_ways({i: KEPT_WAY * SLIP * paces[i] for i in rest.turning})
         self.modes.sticking = {i: rest.partial.get(i, (ranks[i],))[0] for i in rest.sticking}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
-        self.modes.begun, self.modes.limits = (
-            {i: (self.t, rate) for i, rate in rest.rates.items() if rate or frictions.signed[i]},
-            rest.limits,
-        )
+        self.modes.begun, self.modes.limits = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.limits
         self.modes.sharing = {i: ranks[i] for i in rest.sharing}
         if cones is not None:
             self.friction = self._load(packed, rest.loads)
